@@ -1,0 +1,1 @@
+"""Reinforcement learning: training, shipped policies and their report."""

@@ -1,0 +1,1 @@
+"""Classical guidance and control policies, and the report about them."""

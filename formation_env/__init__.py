@@ -1,0 +1,1 @@
+"""Satellite formation flying as Gymnasium environments."""

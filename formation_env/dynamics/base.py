@@ -1,0 +1,73 @@
+"""What a model of the relative motion offers, and its exact discretisation.
+
+Legend: A state matrix, B control matrix, d constant disturbance, Phi, Gamma, delta their discrete counterparts.
+State: LVLH [x, y, z, x', y', z'], m and m/s; x radial (outward), y along-track, z along the orbit normal.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import expm
+
+from formation_env.orbit import Orbit
+from formation_env.spacecraft import Spacecraft
+
+Array = NDArray[np.float64]
+
+IN_PLANE = np.array([0, 1, 3, 4])
+CROSS_TRACK = np.array([2, 5])
+
+
+class Dynamics(Protocol):
+    """A linear time-invariant model x' = A x + B u + d, whose orbit plane and cross-track motions are uncoupled."""
+
+    def state_matrix(self, orbit: Orbit, spacecraft: Spacecraft) -> Array:
+        """A (6, 6)."""
+        ...
+
+    def disturbance(self, orbit: Orbit, spacecraft: Spacecraft, leader: Spacecraft) -> Array:
+        """d (6,): the constant relative acceleration in its last three elements, m/s^2."""
+        ...
+
+
+def control_matrix() -> Array:
+    """B (6, 3): thrust acceleration enters the velocity rates (Ma 2009, eq. 4.3)."""
+    return np.vstack([np.zeros((3, 3)), np.eye(3)])
+
+
+@dataclass(frozen=True)
+class DiscreteModel:
+    """x(k+1) = Phi x(k) + Gamma u(k) + delta, exact for an input held over the step.
+
+    Attributes:
+        Phi: state transition matrix (..., 6, 6).
+        Gamma: input matrix (..., 6, 3).
+        delta: effect of the constant disturbance (..., 6).
+    """
+
+    Phi: Array
+    Gamma: Array
+    delta: Array
+
+
+def discretise(
+    dynamics: Dynamics, step_s: ArrayLike, orbit: Orbit, spacecraft: Spacecraft, leader: Spacecraft
+) -> DiscreteModel:
+    """Exact zero-order-hold discretisation (Ma 2009, eq. 4.6-4.7), by one matrix exponential (Van Loan 1978).
+
+    Args:
+        dynamics: the model.
+        step_s: one step or an array (...) of steps, s.
+        orbit: the leader's orbit.
+        spacecraft: the follower.
+        leader: the leader.
+    """
+    augmented = np.zeros((10, 10))
+    augmented[:6, :6] = dynamics.state_matrix(orbit, spacecraft)
+    augmented[:6, 6:9] = control_matrix()
+    augmented[:6, 9] = dynamics.disturbance(orbit, spacecraft, leader)
+    # exp([A B d; 0 0 0] T) = [Phi Gamma delta; 0 I]
+    exponential = expm(augmented * np.asarray(step_s, float)[..., None, None])
+    return DiscreteModel(exponential[..., :6, :6], exponential[..., :6, 6:9], exponential[..., :6, 9])

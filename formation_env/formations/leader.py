@@ -1,0 +1,21 @@
+"""The leader's own place, where missions start."""
+
+from typing import Literal
+
+import numpy as np
+
+from formation_env.dynamics.base import Array
+from formation_env.formations.base import Formation
+from formation_env.orbit import Orbit
+from formation_env.settings import settings
+
+
+@settings
+class AtLeader(Formation):
+    """At the leader, at rest."""
+
+    kind: Literal["at_leader"] = "at_leader"
+
+    def state(self, orbit: Orbit) -> Array:
+        """LVLH state (6,): zero."""
+        return np.zeros(6)

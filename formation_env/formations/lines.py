@@ -1,0 +1,42 @@
+"""Formations of constant offset."""
+
+from typing import Literal
+
+import numpy as np
+
+from formation_env.dynamics.base import Array
+from formation_env.formations.base import Formation
+from formation_env.orbit import Orbit
+from formation_env.settings import Real, settings
+
+
+@settings
+class Following(Formation):
+    """On the leader's orbit, ahead of or behind it (Ma 2009, eq. 3.5).
+
+    Attributes:
+        y0_m: along-track offset, m; positive is ahead.
+    """
+
+    kind: Literal["following"] = "following"
+    y0_m: Real = 2000.0
+
+    def state(self, orbit: Orbit) -> Array:
+        """LVLH state (6,), m and m/s."""
+        return np.array([0, self.y0_m, 0, 0, 0, 0])
+
+
+@settings
+class Parallel(Formation):
+    """On a circular orbit above or below the leader's (Ma 2009, eq. 3.6), so drifting along it at -1.5 n x0.
+
+    Attributes:
+        x0_m: radial offset, m.
+    """
+
+    kind: Literal["parallel"] = "parallel"
+    x0_m: Real = 1000.0
+
+    def state(self, orbit: Orbit) -> Array:
+        """LVLH state (6,), m and m/s."""
+        return np.array([self.x0_m, 0, 0, 0, -1.5 * orbit.mean_motion_rad_s * self.x0_m, 0])

@@ -1,0 +1,23 @@
+"""How the compiled functions of the project are made.
+
+A lane function works on one row's scalars. It is inlined where it is called, so that a loop over the rows of a tile has
+a body of scalars only, which the compiler turns into vector instructions.
+"""
+
+from collections.abc import Callable
+from typing import Any, Final, TypeVar, cast
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+LANES: Final = 32
+"""Rows of one tile: a compile-time constant, a multiple of every vector width."""
+
+# Multiply-adds may be fused, nothing else is relaxed: results keep their order of operations, NaN and infinity.
+FAST_MATH: Final = {"contract"}
+
+
+def lane(function: F) -> F:
+    """Compile a function of scalars to be inlined into its callers."""
+    return cast(F, numba.njit(forceinline=True, fastmath=FAST_MATH, error_model="numpy")(function))

@@ -1,0 +1,44 @@
+"""Force-free propagation of relative states."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from formation_env.dynamics import discretise, get_dynamics
+from formation_env.dynamics.base import Array
+from formation_env.orbit import Orbit
+from formation_env.spacecraft import Spacecraft
+
+
+def propagate(
+    initial_state: ArrayLike,
+    times_s: ArrayLike,
+    *,
+    dynamics: str = "modified_hcw",
+    orbit: Orbit | None = None,
+    spacecraft: Spacecraft | None = None,
+    leader_spacecraft: Spacecraft | None = None,
+) -> Array:
+    """Relative states of a follower that does not thrust, exact for the linear model.
+
+    Args:
+        initial_state: LVLH states (..., 6) at t = 0: [x, y, z, x', y', z'], m and m/s.
+        times_s: times (T,), s, in any order; negative ones run backwards.
+        dynamics: name of a model in `formation_env.dynamics.DYNAMICS`.
+        orbit: the leader's orbit; the thesis's by default.
+        spacecraft: the follower; the thesis's by default.
+        leader_spacecraft: the leader; like the follower by default.
+
+    Returns:
+        States (..., T, 6), m and m/s.
+
+    Raises:
+        ValueError: unknown model, wrong shape, or a number that is not finite.
+    """
+    states, times = np.asarray(initial_state, float), np.asarray(times_s, float)
+    if states.ndim == 0 or states.shape[-1] != 6 or not np.isfinite(states).all():
+        raise ValueError(f"initial_state must be finite with shape (..., 6), got shape {states.shape}: {states}")
+    if times.ndim != 1 or not np.isfinite(times).all():
+        raise ValueError(f"times_s must be finite with shape (T,), got shape {times.shape}: {times}")
+    follower = spacecraft or Spacecraft()
+    model = discretise(get_dynamics(dynamics), times, orbit or Orbit(), follower, leader_spacecraft or follower)
+    return np.einsum("tij,...j->...ti", model.Phi, states) + model.delta

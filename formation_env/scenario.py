@@ -1,0 +1,198 @@
+"""What is flown: a scenario, and its loader."""
+
+import math
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import model_validator
+
+from formation_env.dropout import AnyDropout, GilbertElliott
+from formation_env.dynamics import DYNAMICS, DiscreteModel, discretise, get_dynamics
+from formation_env.estimation import KalmanFilter, Sensor
+from formation_env.formations import AnyFormation, AtLeader
+from formation_env.orbit import Orbit
+from formation_env.settings import ConfigError, Field, NonNegative, Positive, Text, build, load_yaml, nearest, settings
+from formation_env.spacecraft import Spacecraft
+
+
+@settings
+class Start:
+    """Where an episode starts.
+
+    Attributes:
+        formation: the nominal start is this formation's state.
+        spread_pos_m: 1-sigma of the true position about it, each axis, m.
+        spread_vel_m_s: 1-sigma of the true velocity about it, each axis, m/s.
+    """
+
+    formation: AnyFormation = AtLeader()
+    spread_pos_m: NonNegative = 10.0
+    spread_vel_m_s: NonNegative = 0.01
+
+
+@settings
+class Phase:
+    """One leg of the mission: get to a formation, then hold it.
+
+    Both times are rounded to whole steps.
+
+    Attributes:
+        formation: the target; the follower should be at its state at the arrival.
+        transfer_periods: time to get there, in orbital periods; 0 is to be there at once.
+        hold_periods: time to stay, in orbital periods.
+    """
+
+    formation: AnyFormation
+    transfer_periods: NonNegative = 0.0
+    hold_periods: Positive
+
+
+@settings
+class Reward:
+    """r = -(delta-v + error_weight |e| dt / T_hold), an equivalent delta-v in m/s.
+
+    Attributes:
+        error_weight: price of the mean position error of the hold, (m/s) per m.
+        transfer_error_weight: the same for errors during transfer; 0 leaves the way free.
+        shape: `linear` in the error, or `quadratic`: |e|^2 / quadratic_scale_m in place of |e|.
+        quadratic_scale_m: error at which both shapes cost the same, m.
+    """
+
+    error_weight: NonNegative = 0.01
+    transfer_error_weight: NonNegative = 0.0
+    shape: Literal["linear", "quadratic"] = "linear"
+    quadratic_scale_m: Positive = 100.0
+
+
+@settings
+class Limits:
+    """What ends an episode early.
+
+    Attributes:
+        max_distance_m: greatest distance from the reference, m.
+        keep_out_m: radius of a sphere around the leader that must not be entered, m; 0 is none.
+    """
+
+    max_distance_m: Positive = 50e3
+    keep_out_m: NonNegative = 0.0
+
+
+@settings
+class Scenario:
+    """All settings of an environment; frozen, and checked when made.
+
+    Attributes:
+        title: one line for people.
+        orbit: the leader's orbit.
+        spacecraft: the follower.
+        leader_spacecraft: the leader; like the follower if left out.
+        dynamics: name of the true dynamics model.
+        process_noise_m_s2: 1-sigma of a random acceleration of each axis, held over a step, m/s^2.
+        sensor: relative navigation.
+        filter: what the Kalman filter believes.
+        dropout: when measurements are lost.
+        dt_s: time step, s.
+        start: where episodes start.
+        phases: the legs of the mission, in order.
+        reward: weights.
+        limits: early ends.
+        tolerance_m: position error that counts as good in the report, m.
+    """
+
+    title: Text = ""
+    orbit: Orbit = Orbit()
+    spacecraft: Spacecraft = Spacecraft()
+    leader_spacecraft: Spacecraft | None = None
+    dynamics: Text = "modified_hcw"
+    process_noise_m_s2: NonNegative = 5e-6
+    sensor: Sensor = Sensor()
+    filter: KalmanFilter = KalmanFilter()
+    dropout: AnyDropout = GilbertElliott()
+    dt_s: Positive = 30.0
+    start: Start = Start()
+    phases: Annotated[tuple[Phase, ...], Field(min_length=1)]
+    reward: Reward = Reward()
+    limits: Limits = Limits()
+    tolerance_m: Positive = 50.0
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        """Refuse what no single field can: unknown models, phases shorter than a step, an impossible start."""
+        for key, name in (("dynamics", self.dynamics), ("filter.dynamics", self.filter.dynamics)):
+            if name is not None and name not in DYNAMICS:
+                raise ValueError(f"{key}: no dynamics model named {name!r}; {nearest(name, DYNAMICS)}")
+        if self.num_steps > MAX_STEPS:
+            raise ValueError(f"dt_s: {self.num_steps} steps of {self.dt_s:g} s; an episode has at most {MAX_STEPS}")
+        for index, phase in enumerate(self.phases):
+            for key in ("transfer_periods", "hold_periods"):
+                periods = getattr(phase, key)
+                if periods > 0 and self.steps(periods) == 0:
+                    seconds = periods * self.orbit.period_s
+                    raise ValueError(
+                        f"phases.{index}.{key}: {periods:g} periods are {seconds:.4g} s, which rounds to no step of "
+                        f"dt_s = {self.dt_s:g} s"
+                    )
+        if self.spacecraft.min_accel_m_s2 > math.sqrt(3) * self.spacecraft.max_accel_m_s2:
+            raise ValueError("spacecraft.min_accel_m_s2: above the greatest thrust, so the thruster never fires")
+        self.dropout.chain(self.dt_s, self.orbit)
+        return self
+
+    def steps(self, periods: float) -> int:
+        """A time in orbital periods as the nearest number of whole steps."""
+        return round(periods * self.orbit.period_s / self.dt_s)
+
+    @property
+    def num_steps(self) -> int:
+        """Steps of a whole episode."""
+        return sum(self.steps(p.transfer_periods) + self.steps(p.hold_periods) for p in self.phases)
+
+    @property
+    def hold_s(self) -> float:
+        """Total hold time of an episode, s."""
+        return self.dt_s * sum(self.steps(p.hold_periods) for p in self.phases)
+
+    @property
+    def leader(self) -> Spacecraft:
+        """The leader's spacecraft."""
+        return self.leader_spacecraft or self.spacecraft
+
+    def true_model(self) -> DiscreteModel:
+        """The true dynamics over one step."""
+        return discretise(get_dynamics(self.dynamics), self.dt_s, self.orbit, self.spacecraft, self.leader)
+
+    def filter_model(self, step_s: float | None = None) -> DiscreteModel:
+        """The dynamics that the filter believes, over one step or over step_s, s (an array gives an array)."""
+        name = self.filter.dynamics or self.dynamics
+        step_s = self.dt_s if step_s is None else step_s
+        return discretise(get_dynamics(name), step_s, self.orbit, self.spacecraft, self.leader)
+
+
+MAX_STEPS = 1_000_000
+
+
+def config_folder(name: str) -> Path:
+    """The folder `configs/NAME`: inside the installed package, or beside it in a checkout."""
+    inside = Path(str(files("formation_env"))) / "configs" / name
+    return inside if inside.is_dir() else inside.parents[2] / "configs" / name
+
+
+def scenario_names() -> list[str]:
+    """Names of the scenarios that come with the package."""
+    return sorted(path.stem for path in config_folder("scenarios").glob("*.yaml"))
+
+
+def load_scenario(scenario: "str | Path | Scenario") -> Scenario:
+    """A scenario by name, by path of a YAML file, or as it is.
+
+    Raises:
+        ConfigError: one line per fault, naming file, key and value.
+    """
+    if isinstance(scenario, Scenario):
+        return scenario
+    path = Path(scenario)
+    if path.suffix not in (".yaml", ".yml"):
+        path = config_folder("scenarios") / f"{scenario}.yaml"
+        if not path.is_file():
+            raise ConfigError(f"no scenario named {str(scenario)!r}; {nearest(str(scenario), scenario_names())}")
+    return build(Scenario, load_yaml(path), str(path))

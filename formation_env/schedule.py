@@ -1,0 +1,134 @@
+"""The plan of an episode as a table: one row for each instant, the same for every episode of a scenario."""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, Array
+from formation_env.observation import ObservationLayout
+from formation_env.scenario import Phase, Scenario
+
+FIELDS: Final = {
+    "reference": 6,  # reference state of the phase that is in force from this instant on, m and m/s
+    "scored_position": 3,  # reference position of the phase that the step to this instant belongs to, m
+    "coast_in_plane": 16,  # transition matrix to the arrival by the filter's model, row by row
+    "coast_cross_track": 4,
+    "coast_offset": 6,  # to be added, so that the error at the arrival comes out
+    "time_to_arrival": 1,  # in periods; 0 in hold
+    "in_hold": 1,
+    "phase": 1,  # index over number of phases
+    "time_left": 1,  # to the end of the phase, in periods
+    "link_closed": 1,  # 1 while a dropout window is open
+    "error_price": 1,  # price of an error over the step to this instant, (m/s) per m
+    "price_left": 1,  # sum of the later prices
+    "counts": 1,  # 1 if the step to this instant belongs to a hold
+    "counts_left": 1,  # later steps that do
+    "arrives": 1,  # 1 / number of arrivals if this instant is one
+}
+
+
+def _offsets() -> dict[str, int]:
+    ends = np.cumsum(list(FIELDS.values()))
+    return {name: int(end) - size for (name, size), end in zip(FIELDS.items(), ends, strict=True)}
+
+
+OFFSETS: Final = _offsets()
+WIDTH: Final = sum(FIELDS.values())
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A phase on the clock, in steps: it is in force from start to end, and must be there at arrival."""
+
+    index: int
+    phase: Phase
+    start: int
+    arrival: int
+    end: int
+
+
+def legs(scenario: Scenario) -> list[Leg]:
+    """The phases of a scenario on the clock."""
+    result, start = [], 0
+    for index, phase in enumerate(scenario.phases):
+        arrival = start + scenario.steps(phase.transfer_periods)
+        end = arrival + scenario.steps(phase.hold_periods)
+        result.append(Leg(index, phase, start, arrival, end))
+        start = end
+    return result
+
+
+def leg_reference(scenario: Scenario, leg: Leg, steps: Array) -> Array:
+    """Reference states (..., 6) of a leg at instants (...), in steps: on the way to the arrival and after it."""
+    return leg.phase.formation.reference((steps - leg.arrival) * scenario.dt_s, scenario.orbit)
+
+
+def observation_layout(scenario: Scenario) -> ObservationLayout:
+    """The observation layout with the scenario's scales."""
+    start = np.linalg.norm(scenario.start.formation.state(scenario.orbit)[:3])
+    held = [
+        np.linalg.norm(leg_reference(scenario, leg, np.arange(leg.arrival, leg.end + 1))[:, :3], axis=1).max()
+        for leg in legs(scenario)
+    ]
+    return ObservationLayout(
+        length_m=float(max(start, *held, 1000.0)),
+        mean_motion_rad_s=scenario.orbit.mean_motion_rad_s,
+        period_s=scenario.orbit.period_s,
+        num_phases=len(scenario.phases),
+    )
+
+
+def build_schedule(scenario: Scenario) -> Array:
+    """The table (num_steps + 1, WIDTH); the columns are `FIELDS`."""
+    table = np.zeros((scenario.num_steps + 1, WIDTH))
+    for leg in legs(scenario):
+        _fill_plan(table, scenario, leg)
+        _fill_scores(table, scenario, leg)
+    times_s = scenario.dt_s * np.arange(len(table))
+    _column(table, "link_closed")[:] = scenario.dropout.closed(times_s)
+    for name, left in (("error_price", "price_left"), ("counts", "counts_left")):
+        column = _column(table, name)
+        _column(table, left)[:] = column.sum() - np.cumsum(column)
+    return table
+
+
+def _column(table: Array, name: str) -> Array:
+    return table[:, OFFSETS[name]]
+
+
+def _columns(table: Array, name: str) -> Array:
+    return table[:, OFFSETS[name] : OFFSETS[name] + FIELDS[name]]
+
+
+def _fill_plan(table: Array, scenario: Scenario, leg: Leg) -> None:
+    """What the follower should do from each instant of the leg on (its end belongs to the next leg, if there is one)."""
+    steps = np.arange(leg.start, leg.end + 1)
+    in_force = slice(leg.start, leg.end + 1)
+    reference = leg_reference(scenario, leg, steps)
+    coast_s = np.maximum(leg.arrival - steps, 0) * scenario.dt_s
+    coast = scenario.filter_model(coast_s)
+    goal = leg_reference(scenario, leg, np.maximum(steps, leg.arrival))
+    _columns(table, "reference")[in_force] = reference
+    _columns(table, "coast_in_plane")[in_force] = coast.Phi[:, IN_PLANE[:, None], IN_PLANE].reshape(-1, 16)
+    _columns(table, "coast_cross_track")[in_force] = coast.Phi[:, CROSS_TRACK[:, None], CROSS_TRACK].reshape(-1, 4)
+    _columns(table, "coast_offset")[in_force] = coast.delta - goal
+    period_s = scenario.orbit.period_s
+    _column(table, "time_to_arrival")[in_force] = coast_s / period_s
+    _column(table, "in_hold")[in_force] = steps >= leg.arrival
+    _column(table, "phase")[in_force] = leg.index / len(scenario.phases)
+    _column(table, "time_left")[in_force] = (leg.end - steps) * scenario.dt_s / period_s
+
+
+def _fill_scores(table: Array, scenario: Scenario, leg: Leg) -> None:
+    """How the steps of the leg are judged, each at its end."""
+    ends = np.arange(leg.start + 1, leg.end + 1)
+    judged = slice(leg.start + 1, leg.end + 1)
+    if leg.start == 0:
+        ends, judged = np.arange(leg.end + 1), slice(0, leg.end + 1)
+    held = ends > leg.arrival
+    weight = np.where(held, scenario.reward.error_weight, scenario.reward.transfer_error_weight)
+    _columns(table, "scored_position")[judged] = leg_reference(scenario, leg, ends)[:, :3]
+    _column(table, "error_price")[judged] = np.where(ends > 0, weight, 0) * scenario.dt_s / scenario.hold_s
+    _column(table, "counts")[judged] = held
+    _column(table, "arrives")[leg.arrival] = 1 / len(scenario.phases)
