@@ -21,3 +21,8 @@ FAST_MATH: Final = {"contract"}
 def lane(function: F) -> F:
     """Compile a function of scalars to be inlined into its callers."""
     return cast(F, numba.njit(forceinline=True, fastmath=FAST_MATH, error_model="numpy")(function))
+
+
+def stage(function: F) -> F:
+    """Compile a function that runs a few lane functions over the rows of a tile."""
+    return cast(F, numba.njit(fastmath=FAST_MATH, error_model="numpy")(function))

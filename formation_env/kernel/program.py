@@ -1,0 +1,235 @@
+"""The compiled step and reset over all tiles."""
+
+import hashlib
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from formation_env.dynamics.base import Array
+from formation_env.jit import FAST_MATH, LANES, stage
+from formation_env.kernel import lanes, packing
+from formation_env.kernel import tile as f
+from formation_env.observation import SIZE
+from formation_env.schedule import WIDTH
+
+_STATE_SIZE = f.STATE_FIELDS * LANES
+_RESET_BLOCK = 3  # a reset draws from blocks of its own, so that its first measurement is drawn like any other
+
+
+# The stages over one tile. Each is a function of its own, since the compiler loses its grip on larger ones.
+
+
+@stage
+def _draw(t: Array, first_block: int) -> None:
+    for block in range(3):
+        for i in range(LANES):
+            lanes.draw_uniforms(t, i, block, first_block)
+    for pair in range(5):
+        for i in range(LANES):
+            lanes.draw_normals(t, i, pair)
+
+
+@stage
+def _move(t: Array, truth: packing.Model, c: packing.Scalars) -> None:
+    for i in range(LANES):
+        lanes.thruster(t, i, c)
+    for i in range(LANES):
+        lanes.truth_dynamics(t, i, truth, c)
+    for i in range(LANES):
+        lanes.link(t, i, c)
+
+
+@stage
+def _predict(t: Array, believed: packing.Model, belief: packing.Belief) -> None:
+    for i in range(LANES):
+        lanes.filter_time_update(t, i, believed, belief)
+
+
+@stage
+def _measure(t: Array, belief: packing.Belief, c: packing.Scalars) -> None:
+    for i in range(LANES):
+        lanes.dropout(t, i, c)
+    for i in range(LANES):
+        lanes.filter_measurement_update(t, i, belief, c)
+
+
+@stage
+def _judge(t: Array, c: packing.Scalars) -> None:
+    for i in range(LANES):
+        lanes.reward_and_end(t, i, c)
+    for i in range(LANES):
+        lanes.totals(t, i, c)
+
+
+@stage
+def _observe(t: Array, c: packing.Scalars) -> None:
+    for axis in range(6):
+        for i in range(LANES):
+            lanes.observe_error(t, i, axis, c)
+    for i in range(LANES):
+        lanes.observe_arrival(t, i, c)
+    for i in range(LANES):
+        lanes.observe_rest(t, i, c)
+
+
+@stage
+def _begin(t: Array, given: Array, c: packing.Scalars) -> None:
+    for i in range(LANES):
+        lanes.begin(t, i, given[i], c)
+
+
+@stage
+def _read_plan(t: Array, schedule: Array, known_step: int) -> int:
+    """The schedule's rows. Mostly all rows are at one step, which the scratch space may hold already.
+
+    Args:
+        t: the tile.
+        schedule: the table.
+        known_step: the step whose row the whole tile holds, or -1.
+
+    Returns:
+        The same, after this call.
+    """
+    last = len(schedule) - 1
+    first = min(int(t[f.STEP]), last)
+    same = True
+    for i in range(1, LANES):
+        same &= t[f.STEP + i] == t[f.STEP]
+    if same and first == known_step:
+        return first
+    for k in range(WIDTH):
+        for i in range(LANES):
+            step = first if same else min(int(t[f.STEP + i]), last)
+            t[f.PLAN + k * LANES + i] = schedule[step, k]
+    return first if same else -1
+
+
+def _compile(source_hash: int) -> tuple[Any, Any]:
+    """Compile step and reset.
+
+    numba's cache looks only at the file of the outermost function; the hash, which is part of the cache's key, makes it
+    see the others too.
+    """
+    compiled = numba.njit(cache=True, fastmath=FAST_MATH, error_model="numpy")
+
+    @compiled  # type: ignore[untyped-decorator]
+    def step(
+        states: Array,
+        t: Array,
+        schedule: Array,
+        settings: Array,
+        actions: NDArray[np.float32],
+        observations: NDArray[np.float32],
+        results: Array,
+    ) -> int:
+        """One step of all rows.
+
+        Args:
+            states: the rows' states (tiles, STATE_FIELDS * LANES), updated.
+            t: scratch space for one tile (TILE_FIELDS * LANES,).
+            schedule: the plan (num_steps + 1, WIDTH).
+            settings: packed settings.
+            actions: (rows, 3).
+            observations: (rows, SIZE), written.
+            results: (NUM_RESULTS, tiles * LANES), written.
+        """
+        truth, believed, belief, c = packing.unpack(settings)
+        rows = len(actions)
+        known_step = -1
+        for tile in range(len(states)):
+            first = tile * LANES
+            used = min(LANES, rows - first)
+            for k in range(_STATE_SIZE):
+                t[k] = states[tile, k]
+            for i in range(used):
+                for k in range(3):
+                    t[f.ACTION + k * LANES + i] = actions[first + i, k]
+            for i in range(LANES):
+                t[f.STEP + i] += 1.0
+            known_step = _read_plan(t, schedule, known_step)
+            _draw(t, 0)
+            _move(t, truth, c)
+            _predict(t, believed, belief)
+            _measure(t, belief, c)
+            _judge(t, c)
+            _observe(t, c)
+            for k in range(_STATE_SIZE):
+                states[tile, k] = t[k]
+            for i in range(used):
+                for k in range(SIZE):
+                    observations[first + i, k] = np.float32(t[f.OBSERVATION + k * LANES + i])
+            for k in range(f.NUM_RESULTS):
+                for i in range(LANES):
+                    results[k, first + i] = t[f.RESULTS + k * LANES + i]
+        return source_hash
+
+    @compiled  # type: ignore[untyped-decorator]
+    def reset(
+        states: Array,
+        t: Array,
+        schedule: Array,
+        settings: Array,
+        chosen: NDArray[np.bool_],
+        given: NDArray[np.bool_],
+        starts: Array,
+        observations: NDArray[np.float32],
+        results: Array,
+    ) -> int:
+        """Start the next episode of some rows. A whole tile is begun in scratch space, and what was chosen is kept.
+
+        Args:
+            states: as in `step`.
+            t: as in `step`.
+            schedule: as in `step`.
+            settings: as in `step`.
+            chosen: rows to begin (tiles * LANES,).
+            given: rows that start just at their start, not about it (tiles * LANES,).
+            starts: states to start at (tiles * LANES, 6).
+            observations: written in the rows chosen.
+            results: written in the rows chosen.
+        """
+        _, _, belief, c = packing.unpack(settings)
+        for tile in range(len(states)):
+            first = tile * LANES
+            if not chosen[first : first + LANES].any():
+                continue
+            for k in range(_STATE_SIZE):
+                t[k] = states[tile, k]
+            for i in range(LANES):
+                t[f.STEP + i] = 0.0
+                t[f.EPISODE + i] += 1.0
+                for k in range(6):
+                    t[f.TRUTH + k * LANES + i] = starts[first + i, k]
+            _read_plan(t, schedule, -1)
+            _draw(t, _RESET_BLOCK)
+            _begin(t, given[first : first + LANES], c)
+            _draw(t, 0)
+            _measure(t, belief, c)
+            _judge(t, c)
+            _observe(t, c)
+            for i in range(LANES):
+                if chosen[first + i]:
+                    for k in range(SIZE):
+                        observations[first + i, k] = np.float32(t[f.OBSERVATION + k * LANES + i])
+                    for k in range(f.STATE_FIELDS):
+                        states[tile, k * LANES + i] = t[k * LANES + i]
+                    for k in range(f.NUM_RESULTS):
+                        results[k, first + i] = t[f.RESULTS + k * LANES + i]
+        return source_hash
+
+    return step, reset
+
+
+def _source_hash() -> int:
+    """A number that changes with any source file that the compiled code may come from."""
+    package = Path(__file__).parents[1]
+    digest = hashlib.sha256()
+    for path in sorted([*package.glob("*.py"), *package.glob("kernel/*.py")]):
+        digest.update(path.read_bytes())
+    return int.from_bytes(digest.digest()[:7])
+
+
+step, reset = _compile(_source_hash())
