@@ -3,8 +3,10 @@
 import math
 from typing import Annotated
 
+from pydantic import Field
+
 from formation_env.constants import J2, MU_EARTH, R_EARTH
-from formation_env.settings import Field, Flag, Positive, Real, settings
+from formation_env.settings import Flag, Positive, Real, settings
 
 
 @settings

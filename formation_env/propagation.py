@@ -41,4 +41,5 @@ def propagate(
         raise ValueError(f"times_s must be finite with shape (T,), got shape {times.shape}: {times}")
     follower = spacecraft or Spacecraft()
     model = discretise(get_dynamics(dynamics), times, orbit or Orbit(), follower, leader_spacecraft or follower)
-    return np.einsum("tij,...j->...ti", model.Phi, states) + model.delta
+    path: Array = np.einsum("tij,...j->...ti", model.Phi, states) + model.delta
+    return path

@@ -17,7 +17,7 @@ FIELDS: Final = {
     "coast_offset": 6,  # to be added, so that the error at the arrival comes out
     "time_to_arrival": 1,  # in periods; 0 in hold
     "in_hold": 1,
-    "phase": 1,  # index over number of phases
+    "phase": 1,  # index
     "time_left": 1,  # to the end of the phase, in periods
     "link_closed": 1,  # 1 while a dropout window is open
     "error_price": 1,  # price of an error over the step to this instant, (m/s) per m
@@ -116,7 +116,7 @@ def _fill_plan(table: Array, scenario: Scenario, leg: Leg) -> None:
     period_s = scenario.orbit.period_s
     _column(table, "time_to_arrival")[in_force] = coast_s / period_s
     _column(table, "in_hold")[in_force] = steps >= leg.arrival
-    _column(table, "phase")[in_force] = leg.index / len(scenario.phases)
+    _column(table, "phase")[in_force] = leg.index
     _column(table, "time_left")[in_force] = (leg.end - steps) * scenario.dt_s / period_s
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from dataclasses import fields as dataclass_fields
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, dataclass_transform
+from typing import Annotated, Any, Final, TypeVar, cast, dataclass_transform
 
 import pydantic
 from pydantic import AllowInfNan, ConfigDict, Field, GetCoreSchemaHandler, Strict
@@ -26,6 +26,13 @@ Probability = Annotated[Real, Field(ge=0, le=1)]
 Flag = Annotated[bool, Strict()]
 Text = Annotated[str, Strict()]
 Vector3 = tuple[Real, Real, Real]
+
+# What pydantic says of Python objects, in a YAML author's words.
+_PLAIN_WORDS: Final = {
+    "missing": "required but missing",
+    "dataclass_type": "must be a mapping",
+    "tuple_type": "must be a list",
+}
 
 
 class ConfigError(ValueError):
@@ -45,9 +52,9 @@ def settings(cls: type[T]) -> type[T]:
                 raise PydanticCustomError("unknown_key", "unknown key; {hint}", {"key": str(key), "hint": hint})
         return data
 
-    cls.refuse_unknown_keys = pydantic.model_validator(mode="before")(classmethod(refuse_unknown_keys))  # type: ignore[attr-defined]
-    config = ConfigDict(extra="forbid")
-    return pydantic_dataclass(cls, frozen=True, kw_only=True, config=config)
+    validator = pydantic.model_validator(mode="before")(classmethod(refuse_unknown_keys))  # type: ignore[arg-type]
+    cls.refuse_unknown_keys = validator  # type: ignore[attr-defined]
+    return cast(type[T], pydantic_dataclass(cls, frozen=True, kw_only=True, config=ConfigDict(extra="forbid")))
 
 
 @dataclass(frozen=True)
@@ -59,7 +66,24 @@ class OneOf:
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Build the tagged union that pydantic validates against."""
         choices = {kind: handler.generate_schema(cls) for kind, cls in self.registry.items()}
-        return core_schema.tagged_union_schema(choices, discriminator="kind")
+        union = core_schema.tagged_union_schema(choices, discriminator="kind")
+        return core_schema.no_info_before_validator_function(self._refuse_unknown_kind, union)
+
+    def _refuse_unknown_kind(self, data: Any) -> Any:
+        """Check the `kind` key before pydantic does, to say which kinds there are."""
+        known = ", ".join(sorted(self.registry))
+        kind = data.get("kind") if isinstance(data, Mapping) else getattr(data, "kind", None)
+        if kind in list(self.registry):
+            return data
+        if not isinstance(data, Mapping):
+            raise PydanticCustomError("mapping_type", "must be a mapping with a kind ({known})", {"known": known})
+        if kind is None:
+            raise PydanticCustomError(
+                "missing_kind", "kind is missing; known: {known}", {"key": "kind", "known": known}
+            )
+        hint = nearest(str(kind), self.registry)
+        context = {"key": "kind", "kind": repr(kind), "hint": hint}
+        raise PydanticCustomError("unknown_kind", "unknown kind {kind}; {hint}", context)
 
 
 def build(cls: type[T], data: Any, where: str) -> T:
@@ -83,13 +107,16 @@ def _describe(fault: ErrorDetails, data: Any) -> str:
     """One line for one fault: the dotted path of the key, what is wrong, what was given."""
     context = fault.get("ctx", {})
     path = _path((*fault["loc"], context["key"]) if "key" in context else fault["loc"], data)
-    message = fault["msg"].removeprefix("Value error, ")
-    given = fault["input"]
-    if fault["type"] in ("unknown_key", "value_error", "missing"):
+    message = _PLAIN_WORDS.get(fault["type"], fault["msg"])
+    message = message.removeprefix("Value error, ").replace("Input should", "must", 1)
+    if fault["type"] == "value_error" and not fault["loc"]:
+        return message  # a check of the whole object; it names its keys
+    if fault["type"] in ("unknown_key", "missing_kind", "unknown_kind", "value_error", "missing"):
         return f"{path}: {message}"
+    given = fault["input"]
     if isinstance(given, str):
-        message += " (this is a string)"
-    return f"{path}: {message}, got {str(given)[:80]!r}" if isinstance(given, str) else f"{path}: {message}, got {str(given)[:80]}"
+        return f"{path}: {message}, got the string {given[:80]!r}"
+    return f"{path}: {message}, got {str(given)[:80]}"
 
 
 def _path(loc: Iterable[str | int], data: Any) -> str:
@@ -113,13 +140,16 @@ def load_yaml(path: Path) -> Any:
         ConfigError: the file is missing, unreadable, or no YAML.
     """
     from ruamel.yaml import YAML
-    from ruamel.yaml.error import YAMLError
+    from ruamel.yaml.error import MarkedYAMLError, YAMLError
 
     try:
         return YAML(typ="safe", pure=True).load(path)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
-    except (YAMLError, UnicodeDecodeError) as error:
+    except MarkedYAMLError as error:
+        line = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
+        raise ConfigError(f"{path}: {line}no valid YAML: {error.problem}") from None
+    except (YAMLError, ValueError) as error:  # ValueError: not UTF-8, or a date that does not exist
         raise ConfigError(f"{path}: no valid YAML: {' '.join(str(error).split())}") from None
 
 

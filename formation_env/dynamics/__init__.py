@@ -1,6 +1,6 @@
 """Models of the relative motion. To add one: a file with a class that has `Dynamics`' methods, and a line here."""
 
-from formation_env.dynamics.base import Dynamics, DiscreteModel, discretise
+from formation_env.dynamics.base import DiscreteModel, Dynamics, discretise
 from formation_env.dynamics.hcw import HCW, transition_matrix
 from formation_env.dynamics.modified_hcw import ModifiedHCW
 from formation_env.settings import nearest
@@ -19,4 +19,13 @@ def get_dynamics(name: str) -> Dynamics:
     return DYNAMICS[name]()
 
 
-__all__ = ["DYNAMICS", "HCW", "DiscreteModel", "Dynamics", "ModifiedHCW", "discretise", "get_dynamics", "transition_matrix"]
+__all__ = [
+    "DYNAMICS",
+    "HCW",
+    "DiscreteModel",
+    "Dynamics",
+    "ModifiedHCW",
+    "discretise",
+    "get_dynamics",
+    "transition_matrix",
+]

@@ -28,14 +28,20 @@ PRICE_LEFT: Final = f.plan("price_left")
 COUNTS: Final = f.plan("counts")
 COUNTS_LEFT: Final = f.plan("counts_left")
 ARRIVES: Final = f.plan("arrives")
-CLOCK: Final = f.plan("time_to_arrival")  # and in_hold, phase, time_left
+TIME_TO_ARRIVAL: Final = f.plan("time_to_arrival")
+IN_HOLD: Final = f.plan("in_hold")
+PHASE: Final = f.plan("phase")
+TIME_LEFT: Final = f.plan("time_left")
 
 SEEN_ERROR: Final = f.seen("error")
 SEEN_ARRIVAL: Final = f.seen("arrival_error")
 SEEN_ERROR_LOG: Final = f.seen("error_log")
 SEEN_ARRIVAL_LOG: Final = f.seen("arrival_error_log")
 SEEN_REFERENCE: Final = f.seen("reference")
-SEEN_CLOCK: Final = f.seen("time_to_arrival")
+SEEN_TIME_TO_ARRIVAL: Final = f.seen("time_to_arrival")
+SEEN_IN_HOLD: Final = f.seen("in_hold")
+SEEN_PHASE: Final = f.seen("phase")
+SEEN_TIME_LEFT: Final = f.seen("time_left")
 SEEN_SIGMA_POS: Final = f.seen("sigma_pos")
 SEEN_SIGMA_VEL: Final = f.seen("sigma_vel")
 SEEN_MEASURED: Final = f.seen("measured")
@@ -221,6 +227,7 @@ def reward_and_end(t: Array, i: int, c: Scalars) -> None:
     stay_cost = t[PRICE_LEFT + i] * (c.linear_cost * stay + c.quadratic_cost * stay * stay)
     exit_cost = stay_cost if ends else 0.0
     error_cost = t[ERROR_PRICE + i] * (c.linear_cost * error + c.quadratic_cost * error * error)
+    t[f.PHASE + i] = t[PHASE + i]
     t[f.POSITION_ERROR + i] = error
     t[f.ERROR_COST + i] = error_cost
     t[f.EXIT_COST + i] = exit_cost
@@ -294,8 +301,10 @@ def observe_arrival(t: Array, i: int, c: Scalars) -> None:
 @lane
 def observe_rest(t: Array, i: int, c: Scalars) -> None:
     """Clock, filter's uncertainty and link."""
-    for k in range(4):
-        t[SEEN_CLOCK + k * LANES + i] = _cut(t[CLOCK + k * LANES + i])
+    t[SEEN_TIME_TO_ARRIVAL + i] = _cut(t[TIME_TO_ARRIVAL + i])
+    t[SEEN_IN_HOLD + i] = t[IN_HOLD + i]
+    t[SEEN_PHASE + i] = c.per_phase * t[PHASE + i]
+    t[SEEN_TIME_LEFT + i] = _cut(t[TIME_LEFT + i])
     p, q = f.P_IN_PLANE + i, f.P_CROSS_TRACK + i
     variance_pos = (t[p] + t[p + 4 * LANES] + t[q]) / 3.0
     variance_vel = (t[p + 7 * LANES] + t[p + 9 * LANES] + t[q + 2 * LANES]) / 3.0
@@ -330,5 +339,7 @@ def begin(t: Array, i: int, given: bool, c: Scalars) -> None:
     t[f.LINK_UP + i] = 1.0 if t[LINK_UNIFORM + i] >= c.link_loss else 0.0
     t[f.AGE + i] = -c.dt_s  # 0 at the first measurement, whether it arrives or not
     t[f.DELTA_V + i] = 0.0
+    for k in range(3):
+        t[f.THRUST + k * LANES + i] = 0.0
     for total in range(f.SUM_REWARD, f.STATE_FIELDS * LANES, LANES):
         t[total + i] = 0.0

@@ -63,6 +63,7 @@ class Scalars(NamedTuple):
     per_length: float
     per_speed: float
     per_log_age: float
+    per_phase: float
 
 
 MODEL_SIZE: Final = 36
@@ -165,4 +166,5 @@ def _scalars(scenario: Scenario) -> Scalars:
         per_length=1 / layout.length_m,
         per_speed=1 / (layout.length_m * layout.mean_motion_rad_s),
         per_log_age=1 / np.log1p(layout.period_s / scenario.dt_s),
+        per_phase=1 / layout.num_phases,
     )

@@ -1,0 +1,87 @@
+"""What the single and the batched environment have in common: spaces, info, checks."""
+
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from formation_env import observation
+from formation_env.dynamics.base import Array
+from formation_env.kernel import tile as f
+from formation_env.scenario import Limits
+
+INFO_STATES: Final = {"true_state": (f.TRUTH, 6), "estimate": (f.ESTIMATE, 6)}
+"""Info key: first state field, size."""
+INFO_THRUST: Final = "accel_m_s2"
+INFO_SCALARS: Final[dict[str, tuple[int, type]]] = {
+    "position_error_m": (f.POSITION_ERROR, float),
+    "delta_v_m_s": (f.DELTA_V, float),
+    "error_cost_m_s": (f.ERROR_COST, float),
+    "exit_cost_m_s": (f.EXIT_COST, float),
+    "nis": (f.NIS, float),
+    "measured": (f.MEASURED, bool),
+    "phase": (f.PHASE, int),
+}
+"""Info key: result field, type."""
+TOTALS: Final = "episode_totals"
+START_OPTION: Final = "initial_state"
+
+
+def action_space() -> spaces.Box:
+    """LVLH acceleration in units of max_accel_m_s2."""
+    return spaces.Box(-1.0, 1.0, (3,), np.float32)
+
+
+def observation_space() -> spaces.Box:
+    """See `formation_env.observation`."""
+    return spaces.Box(-observation.BOUND, observation.BOUND, (observation.SIZE,), np.float32)
+
+
+def read_start(options: Mapping[str, Any] | None, num_rows: int, limits: Limits) -> Array | None:
+    """The start given in reset's options, as (num_rows, 6), or None.
+
+    Raises:
+        ValueError: an unknown option, or a start of wrong shape, not finite, or beyond the limits.
+    """
+    unknown = set(options or {}) - {START_OPTION, "reset_mask"}
+    if unknown:
+        raise ValueError(f"reset options: unknown {sorted(unknown)}; known: {START_OPTION}")
+    if not options or START_OPTION not in options:
+        return None
+    given = np.asarray(options[START_OPTION], float)
+    if given.shape not in ((6,), (num_rows, 6)):
+        raise ValueError(f"{START_OPTION}: shape must be (6,) or ({num_rows}, 6), got {given.shape}")
+    if not np.isfinite(given).all():
+        raise ValueError(f"{START_OPTION}: must be finite, got {given}")
+    if (np.linalg.norm(given[..., :3], axis=-1) < limits.keep_out_m).any():
+        raise ValueError(f"{START_OPTION}: inside the keep-out sphere of {limits.keep_out_m:g} m: {given}")
+    return np.broadcast_to(given, (num_rows, 6))
+
+
+def check_action(action: Any) -> NDArray[np.float32]:
+    """An action as float32 (3,).
+
+    Raises:
+        ValueError: wrong shape, or not finite.
+    """
+    array = np.asarray(action, np.float32)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise ValueError(f"action: must be finite with shape (3,), got shape {array.shape}: {array}")
+    return array
+
+
+def check_actions(actions: Any, num_rows: int) -> NDArray[np.float32]:
+    """Actions as float32 (num_rows, 3).
+
+    Raises:
+        ValueError: wrong shape, or not finite; then it names the first row that is wrong.
+    """
+    array = np.asarray(actions, np.float32)
+    if array.shape != (num_rows, 3):
+        raise ValueError(f"actions: shape must be ({num_rows}, 3), got {array.shape}")
+    if not np.isfinite(array).all():
+        row = int(np.argmin(np.isfinite(array).all(axis=1)))
+        raise ValueError(f"actions: row {row} must be finite, got {array[row]}")
+    return array

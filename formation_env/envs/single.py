@@ -1,0 +1,129 @@
+"""The single environment: one row of a simulation."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from formation_env.envs import interface
+from formation_env.jit import LANES
+from formation_env.kernel import tile as f
+from formation_env.kernel.simulation import Simulation
+from formation_env.metrics import episode_metrics
+from formation_env.scenario import Scenario, load_scenario
+
+Observation = NDArray[np.float32]
+
+_REWARD, _TERMINATED, _TRUNCATED, _THRUST = (
+    (field - f.RESULTS) // LANES for field in (f.REWARD, f.TERMINATED, f.TRUNCATED, f.THRUST)
+)
+
+
+class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
+    """A follower that flies a scenario around its leader.
+
+    Observation: see `formation_env.observation`. Action: LVLH acceleration in units of the scenario's max_accel_m_s2.
+    Reward: see `formation_env.scenario.Reward`. Truncated at the end of the plan; terminated beyond a limit.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "human"], "render_fps": 20}
+
+    def __init__(self, scenario: str | Path | Scenario = "keeping", render_mode: str | None = None) -> None:
+        """Make the environment.
+
+        Args:
+            scenario: a name, a path of a YAML file, or a Scenario.
+            render_mode: None, `rgb_array` or `human`.
+
+        Raises:
+            ConfigError: the scenario is wrong.
+            ValueError: unknown render mode.
+        """
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise ValueError(f"render_mode: must be one of {self.metadata['render_modes']}, got {render_mode!r}")
+        self.scenario = load_scenario(scenario)
+        self.render_mode = render_mode
+        self.action_space = interface.action_space()
+        self.observation_space = interface.observation_space()
+        self.simulation = Simulation(self.scenario, 1)
+        self._keyed = False
+        self._renderer: Any = None
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode.
+
+        Args:
+            seed: of a new random stream; without it the stream goes on.
+            options: `initial_state`: the true LVLH state (6,) to start at, m and m/s.
+
+        Raises:
+            ValueError: wrong options.
+        """
+        starts = interface.read_start(options, 1, self.scenario.limits)
+        super().reset(seed=seed)
+        if seed is not None or not self._keyed:
+            self.simulation.seed(0, self.np_random)
+            self._keyed = True
+        observations = self.simulation.new_observations()
+        self.simulation.reset(np.ones(1, bool), observations, starts)
+        if self._renderer is not None:
+            self._renderer.restart()
+        if self.render_mode == "human":
+            self.render()
+        return observations[0], self._info(self.simulation.results[:, 0].tolist())
+
+    def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Fly one step.
+
+        Args:
+            action: (3,), in units of max_accel_m_s2, cut to [-1, 1].
+
+        Raises:
+            ValueError: the action has a wrong shape or is not finite; nothing has changed then.
+            gymnasium.error.ResetNeeded: before the first reset.
+        """
+        action = interface.check_action(action)
+        if not self._keyed:
+            raise gymnasium.error.ResetNeeded("step: call reset first")
+        simulation = self.simulation
+        simulation.actions[0] = action
+        observations = simulation.new_observations()
+        simulation.step(observations)
+        values = simulation.results[:, 0].tolist()
+        info = self._info(values)
+        terminated, truncated = values[_TERMINATED] > 0.5, values[_TRUNCATED] > 0.5
+        if terminated or truncated:
+            info[interface.TOTALS] = {name: float(value[0]) for name, value in episode_metrics(simulation).items()}
+        if self.render_mode == "human":
+            self.render()
+        return observations[0], values[_REWARD], terminated, truncated, info
+
+    def _info(self, values: list[float]) -> dict[str, Any]:
+        """Info of the last step, from the results (fields,) of the one row."""
+        info: dict[str, Any] = {name: self.simulation.row_state(field, size) for name, (field, size) in interface.INFO_STATES.items()}
+        info[interface.INFO_THRUST] = np.array(values[_THRUST : _THRUST + 3])
+        for name, (field, kind) in interface.INFO_SCALARS.items():
+            info[name] = kind(values[(field - f.RESULTS) // LANES])
+        return info
+
+    def render(self) -> Any:
+        """The scene as an image (height, width, 3) uint8 in mode `rgb_array`; shown in mode `human`."""
+        if self.render_mode is None:
+            gymnasium.logger.warn("render: make the environment with render_mode='rgb_array' or 'human' first")
+            return None
+        if self._renderer is None:
+            from formation_env.rendering import Renderer
+
+            self._renderer = Renderer(self.scenario, self.render_mode)
+        return self._renderer.draw(self.simulation)
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None

@@ -1,0 +1,166 @@
+"""The batched environment: many rows of a simulation."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from formation_env.envs import interface
+from formation_env.kernel import tile as f
+from formation_env.kernel.simulation import Simulation
+from formation_env.metrics import episode_metrics
+from formation_env.scenario import Scenario, load_scenario
+
+Observations = NDArray[np.float32]
+Flags = NDArray[np.bool_]
+
+
+class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
+    """Many followers, each in an episode of its own; row i equals, bit for bit, a single environment with its seed.
+
+    A row that ends is reset in the same step; its last observation and info are in `final_obs` and `final_info`.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        scenario: str | Path | Scenario = "keeping",
+        render_mode: str | None = None,
+    ) -> None:
+        """Make the environment.
+
+        Args:
+            num_envs: rows.
+            scenario: a name, a path of a YAML file, or a Scenario.
+            render_mode: None; render a single environment instead.
+
+        Raises:
+            ConfigError: the scenario is wrong.
+            ValueError: no rows, or a render mode.
+        """
+        if num_envs < 1:
+            raise ValueError(f"num_envs: must be at least 1, got {num_envs}")
+        if render_mode is not None:
+            raise ValueError(f"render_mode: the batched environment has none, got {render_mode!r}")
+        self.scenario = load_scenario(scenario)
+        self.num_envs = num_envs
+        self.render_mode = None
+        self.single_action_space = interface.action_space()
+        self.single_observation_space = interface.observation_space()
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.simulation = Simulation(self.scenario, num_envs)
+        self._keyed = False
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observations, dict[str, Any]]:
+        """Begin an episode in all rows, or in those of a mask.
+
+        Args:
+            seed: row i gets seed + i, or the i-th of a list; without a seed the rows' streams go on.
+            options: `initial_state`: true LVLH states (6,) or (num_envs, 6) to start at, m and m/s; `reset_mask`:
+                rows (num_envs,) to reset, the others stay as they are.
+
+        Raises:
+            ValueError: wrong options or number of seeds.
+        """
+        starts = interface.read_start(options, self.num_envs, self.scenario.limits)
+        chosen = self._mask(options)
+        self._seed(seed, chosen)
+        observations = self.simulation.new_observations()
+        self.simulation.reset(chosen, observations, starts)
+        return observations, self._infos()
+
+    def _mask(self, options: dict[str, Any] | None) -> Flags:
+        mask = np.asarray((options or {}).get("reset_mask", np.ones(self.num_envs, bool)))
+        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
+            raise ValueError(f"reset_mask: must be bool ({self.num_envs},), got {mask.dtype} {mask.shape}")
+        if not self._keyed and not mask.all():
+            raise ValueError("reset_mask: the first reset must be of all rows")
+        return mask
+
+    def _seed(self, seed: int | Sequence[int | None] | None, chosen: Flags) -> None:
+        """Give streams to the chosen rows that have a seed, or to all that have none yet."""
+        if isinstance(seed, (int, np.integer)):
+            seeds: Sequence[int | None] = range(int(seed), int(seed) + self.num_envs)
+            self._np_random, self._np_random_seed = gymnasium.utils.seeding.np_random(int(seed))
+        else:
+            seeds = [None] * self.num_envs if seed is None else seed
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed: a list must have {self.num_envs} elements, got {len(seeds)}")
+        for row in np.flatnonzero(chosen):
+            if seeds[row] is not None or not self._keyed:
+                self.simulation.seed(row, gymnasium.utils.seeding.np_random(seeds[row])[0])
+        self._keyed = True
+
+    def step(self, actions: Any) -> tuple[Observations, NDArray[np.float64], Flags, Flags, dict[str, Any]]:
+        """Fly one step in all rows; rows that end begin their next episode.
+
+        Args:
+            actions: (num_envs, 3), in units of max_accel_m_s2, cut to [-1, 1].
+
+        Raises:
+            ValueError: the actions have a wrong shape or are not finite (it names the row); nothing has changed then.
+            gymnasium.error.ResetNeeded: before the first reset.
+        """
+        actions = interface.check_actions(actions, self.num_envs)
+        if not self._keyed:
+            raise gymnasium.error.ResetNeeded("step: call reset first")
+        simulation = self.simulation
+        simulation.actions[:] = actions
+        observations = simulation.new_observations()
+        simulation.step(observations)
+        rewards = simulation.result(f.REWARD).copy()
+        terminations = simulation.result(f.TERMINATED) > 0.5
+        truncations = simulation.result(f.TRUNCATED) > 0.5
+        ended = terminations | truncations
+        finals = self._begin_next(ended, observations) if ended.any() else {}
+        return observations, rewards, terminations, truncations, {**self._infos(), **finals}
+
+    def _begin_next(self, ended: Flags, observations: Observations) -> dict[str, Any]:
+        """Reset the rows that ended, in place; what they ended with, in Gymnasium's form."""
+        final_info = self._infos()
+        totals: dict[str, Any] = dict(episode_metrics(self.simulation))
+        final_info[interface.TOTALS] = totals | {f"_{name}": ended for name in totals}
+        final_info[f"_{interface.TOTALS}"] = ended
+        final_obs = np.full(self.num_envs, None, dtype=object)
+        for row in np.flatnonzero(ended):
+            final_obs[row] = observations[row].copy()
+        self.simulation.reset(ended, observations)
+        return {
+            "final_obs": final_obs,
+            "_final_obs": ended,
+            "final_info": _only(final_info, ended),
+            "_final_info": ended.copy(),
+        }
+
+    def _infos(self) -> dict[str, Any]:
+        """Infos of the last step, in Gymnasium's form: each key has an array, and a mask of the rows that have it."""
+        simulation = self.simulation
+        infos: dict[str, Any] = {
+            name: simulation.state(field, size) for name, (field, size) in interface.INFO_STATES.items()
+        }
+        infos[interface.INFO_THRUST] = simulation.results[: 3, : self.num_envs].T.copy()
+        for name, (field, kind) in interface.INFO_SCALARS.items():
+            infos[name] = simulation.result(field).astype(kind)
+        return infos | {f"_{name}": np.ones(self.num_envs, bool) for name in infos}
+
+
+def _only(infos: dict[str, Any], rows: Flags) -> dict[str, Any]:
+    """Infos with all other rows blank: zero, and not in the masks."""
+    blank: dict[str, Any] = {}
+    for name, value in infos.items():
+        if isinstance(value, dict):
+            blank[name] = _only(value, rows)
+        else:
+            mask = rows.reshape(-1, *[1] * (value.ndim - 1))
+            blank[name] = np.where(mask, value, np.zeros((), value.dtype))
+    return blank

@@ -1,0 +1,91 @@
+"""Rows of episodes of one scenario: the arrays that the compiled program works on, and named ways into them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from formation_env import observation
+from formation_env.dynamics.base import Array
+from formation_env.jit import LANES
+from formation_env.kernel import packing, program
+from formation_env.kernel import tile as f
+from formation_env.scenario import Scenario
+from formation_env.schedule import build_schedule
+from formation_env.streams import stream_key
+
+
+class Simulation:
+    """Many independent episodes of one scenario, stepped together.
+
+    Attributes:
+        scenario: what is flown.
+        num_rows: episodes side by side.
+        schedule: the plan's table, see `schedule.FIELDS`.
+        actions: (num_rows, 3) float32, to be filled before `step`.
+        results: (fields, rows and padding), of the last step or reset.
+    """
+
+    def __init__(self, scenario: Scenario, num_rows: int) -> None:
+        tiles = -(-num_rows // LANES)
+        self.scenario = scenario
+        self.num_rows = num_rows
+        self.schedule = build_schedule(scenario)
+        self.actions = np.zeros((num_rows, 3), np.float32)
+        self.results = np.zeros((f.NUM_RESULTS, tiles * LANES))
+        self._settings = packing.pack(scenario)
+        self._states = np.zeros((tiles, f.STATE_FIELDS * LANES))
+        self._scratch = np.zeros(f.TILE_FIELDS * LANES)
+        self._nominal_start = scenario.start.formation.state(scenario.orbit)
+
+    def seed(self, row: int, generator: np.random.Generator) -> None:
+        """Give a row a new random stream; its next episode is the stream's first."""
+        key = stream_key(generator).view(np.float64)
+        for field, value in ((f.KEY, key[0]), (f.KEY + LANES, key[1]), (f.EPISODE, -1.0)):
+            self._states[row // LANES, field + row % LANES] = value
+
+    def reset(
+        self, chosen: NDArray[np.bool_], observations: NDArray[np.float32], starts: Array | None = None
+    ) -> None:
+        """Begin the next episode of some rows.
+
+        Args:
+            chosen: which rows (num_rows,).
+            observations: (num_rows, SIZE), written in the rows chosen.
+            starts: LVLH states (num_rows, 6) to start at, in place of the scenario's start and its spread.
+        """
+        padded = self.results.shape[1]
+        mask = np.zeros(padded, bool)
+        mask[: self.num_rows] = chosen
+        given = np.full(padded, starts is not None)
+        places = np.tile(self._nominal_start, (padded, 1))
+        if starts is not None:
+            places[: self.num_rows] = starts
+        program.reset(
+            self._states, self._scratch, self.schedule, self._settings, mask, given, places, observations, self.results
+        )
+
+    def step(self, observations: NDArray[np.float32]) -> None:
+        """Fly all rows over one step with `actions`.
+
+        Args:
+            observations: (num_rows, SIZE), written.
+        """
+        program.step(
+            self._states, self._scratch, self.schedule, self._settings, self.actions, observations, self.results
+        )
+
+    def new_observations(self) -> NDArray[np.float32]:
+        """An array for the observations of all rows."""
+        return np.empty((self.num_rows, observation.SIZE), np.float32)
+
+    def result(self, field: int) -> Array:
+        """View (num_rows,) of one result of the last step."""
+        return self.results[(field - f.RESULTS) // LANES, : self.num_rows]
+
+    def state(self, field: int, size: int) -> Array:
+        """Copy (num_rows, size) of consecutive state fields."""
+        block = self._states[:, field : field + size * LANES].reshape(-1, size, LANES)
+        return block.transpose(0, 2, 1).reshape(-1, size)[: self.num_rows].copy()
+
+    def row_state(self, field: int, size: int) -> Array:
+        """Copy (size,) of consecutive state fields of the first row."""
+        return self._states[0, field : field + size * LANES : LANES].copy()
