@@ -78,9 +78,7 @@ class OneOf:
         if not isinstance(data, Mapping):
             raise PydanticCustomError("mapping_type", "must be a mapping with a kind ({known})", {"known": known})
         if kind is None:
-            raise PydanticCustomError(
-                "missing_kind", "kind is missing; known: {known}", {"key": "kind", "known": known}
-            )
+            raise PydanticCustomError("missing_kind", "missing; known: {known}", {"key": "kind", "known": known})
         hint = nearest(str(kind), self.registry)
         context = {"key": "kind", "kind": repr(kind), "hint": hint}
         raise PydanticCustomError("unknown_kind", "unknown kind {kind}; {hint}", context)

@@ -223,12 +223,15 @@ def _compile(source_hash: int) -> tuple[Any, Any]:
     return step, reset
 
 
+# Files whose functions or constants are compiled into the program, beside those of this folder.
+COMPILED_MODULES = ("jit", "fastmath", "streams", "estimation", "observation", "schedule")
+
+
 def _source_hash() -> int:
-    """A number that changes with any source file that the compiled code may come from."""
+    """A number that changes with any source file that the compiled code comes from."""
     package = Path(__file__).parents[1]
-    digest = hashlib.sha256()
-    for path in sorted([*package.glob("*.py"), *package.glob("kernel/*.py")]):
-        digest.update(path.read_bytes())
+    paths = sorted([*package.glob("kernel/*.py"), *(package / f"{name}.py" for name in COMPILED_MODULES)])
+    digest = hashlib.sha256(b"".join(path.read_bytes() for path in paths))
     return int.from_bytes(digest.digest()[:7])
 
 

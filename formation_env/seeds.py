@@ -1,0 +1,25 @@
+"""Disjoint ranges of episode seeds, so that nothing is judged on what it was tuned on."""
+
+from typing import Final, Literal
+
+Split = Literal["test", "validation", "tuning", "training"]
+
+_SIZE: Final = 1_000_000
+_ORDER: Final[tuple[Split, ...]] = ("test", "validation", "tuning", "training")
+
+
+def seeds(split: Split, count: int) -> range:
+    """The first seeds of a split.
+
+    Args:
+        split: `test` for reports, `validation` to choose among trained models, `tuning` for controllers' gains,
+            `training` for learning.
+        count: how many.
+
+    Raises:
+        ValueError: there are not so many.
+    """
+    if not 1 <= count <= _SIZE:
+        raise ValueError(f"seeds: count must be between 1 and {_SIZE}, got {count}")
+    first = _ORDER.index(split) * _SIZE
+    return range(first, first + count)
