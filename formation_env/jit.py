@@ -14,8 +14,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 LANES: Final = 32
 """Rows of one tile: a compile-time constant, a multiple of every vector width."""
 
-# Multiply-adds may be fused, nothing else is relaxed: results keep their order of operations, NaN and infinity.
-FAST_MATH: Final = {"contract"}
+# Strict IEEE arithmetic, no fused multiply-adds: a row's results are the same bits in a vector and alone.
+FAST_MATH: Final = False
 
 
 def lane(function: F) -> F:

@@ -3,7 +3,7 @@
 import math
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 from pydantic import model_validator
 
@@ -12,7 +12,7 @@ from formation_env.dynamics import DYNAMICS, DiscreteModel, discretise, get_dyna
 from formation_env.estimation import KalmanFilter, Sensor
 from formation_env.formations import AnyFormation, AtLeader
 from formation_env.orbit import Orbit
-from formation_env.settings import ConfigError, Field, NonNegative, Positive, Text, build, load_yaml, nearest, settings
+from formation_env.settings import ConfigError, NonNegative, Positive, Text, build, load_yaml, nearest, settings
 from formation_env.spacecraft import Spacecraft
 
 
@@ -111,19 +111,35 @@ class Scenario:
     dropout: AnyDropout = GilbertElliott()
     dt_s: Positive = 30.0
     start: Start = Start()
-    phases: Annotated[tuple[Phase, ...], Field(min_length=1)]
+    phases: tuple[Phase, ...]
     reward: Reward = Reward()
     limits: Limits = Limits()
     tolerance_m: Positive = 50.0
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """Refuse what no single field can: unknown models, phases shorter than a step, an impossible start."""
+        """Refuse what no single field can: unknown models, times that do not fit the step, an impossible start."""
         for key, name in (("dynamics", self.dynamics), ("filter.dynamics", self.filter.dynamics)):
             if name is not None and name not in DYNAMICS:
                 raise ValueError(f"{key}: no dynamics model named {name!r}; {nearest(name, DYNAMICS)}")
-        if self.num_steps > MAX_STEPS:
-            raise ValueError(f"dt_s: {self.num_steps} steps of {self.dt_s:g} s; an episode has at most {MAX_STEPS}")
+        least, greatest = self.spacecraft.min_accel_m_s2, math.sqrt(3) * self.spacecraft.max_accel_m_s2
+        if least > greatest:
+            raise ValueError(
+                f"spacecraft.min_accel_m_s2: must not be above the greatest thrust, {greatest:.4g}, got {least:g}"
+            )
+        self._check_clock()
+        self._check_start()
+        self.dropout.chain(self.dt_s, self.orbit)
+        return self
+
+    def _check_clock(self) -> None:
+        """Refuse too many steps, and phases shorter than a step."""
+        if not self.phases:
+            raise ValueError("phases: must have at least one phase, got []")
+        periods = sum(phase.transfer_periods + phase.hold_periods for phase in self.phases)
+        steps = periods * self.orbit.period_s / self.dt_s
+        if steps > MAX_STEPS:
+            raise ValueError(f"dt_s: {steps:.7g} steps of {self.dt_s:g} s; an episode has at most {MAX_STEPS}")
         for index, phase in enumerate(self.phases):
             for key in ("transfer_periods", "hold_periods"):
                 periods = getattr(phase, key)
@@ -133,10 +149,24 @@ class Scenario:
                         f"phases.{index}.{key}: {periods:g} periods are {seconds:.4g} s, which rounds to no step of "
                         f"dt_s = {self.dt_s:g} s"
                     )
-        if self.spacecraft.min_accel_m_s2 > math.sqrt(3) * self.spacecraft.max_accel_m_s2:
-            raise ValueError("spacecraft.min_accel_m_s2: above the greatest thrust, so the thruster never fires")
-        self.dropout.chain(self.dt_s, self.orbit)
-        return self
+
+    def _check_start(self) -> None:
+        """Refuse a nominal start at which the first step would end the episode."""
+        place = self.start.formation.state(self.orbit)[:3]
+        range_m = math.hypot(*place)
+        if range_m < self.limits.keep_out_m:
+            raise ValueError(
+                f"start.formation: {range_m:.6g} m from the leader, inside limits.keep_out_m = "
+                f"{self.limits.keep_out_m:g} m"
+            )
+        first = self.phases[0]
+        transfer_s = self.steps(first.transfer_periods) * self.dt_s
+        distance_m = math.dist(place, first.formation.reference(-transfer_s, self.orbit)[:3])
+        if distance_m > self.limits.max_distance_m:
+            raise ValueError(
+                f"start.formation: {distance_m:.6g} m from the first phase's reference, beyond "
+                f"limits.max_distance_m = {self.limits.max_distance_m:g} m"
+            )
 
     def steps(self, periods: float) -> int:
         """A time in orbital periods as the nearest number of whole steps."""

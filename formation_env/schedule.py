@@ -102,22 +102,36 @@ def _columns(table: Array, name: str) -> Array:
 
 
 def _fill_plan(table: Array, scenario: Scenario, leg: Leg) -> None:
-    """What the follower should do from each instant of the leg on (its end belongs to the next leg, if there is one)."""
+    """What to do from each instant of the leg on (its end belongs to the next leg, if there is one)."""
     steps = np.arange(leg.start, leg.end + 1)
     in_force = slice(leg.start, leg.end + 1)
     reference = leg_reference(scenario, leg, steps)
-    coast_s = np.maximum(leg.arrival - steps, 0) * scenario.dt_s
-    coast = scenario.filter_model(coast_s)
+    coast_steps = np.maximum(leg.arrival - steps, 0)
+    Phi, delta = _coasts(scenario, leg.arrival - leg.start)
     goal = leg_reference(scenario, leg, np.maximum(steps, leg.arrival))
     _columns(table, "reference")[in_force] = reference
-    _columns(table, "coast_in_plane")[in_force] = coast.Phi[:, IN_PLANE[:, None], IN_PLANE].reshape(-1, 16)
-    _columns(table, "coast_cross_track")[in_force] = coast.Phi[:, CROSS_TRACK[:, None], CROSS_TRACK].reshape(-1, 4)
-    _columns(table, "coast_offset")[in_force] = coast.delta - goal
+    _columns(table, "coast_in_plane")[in_force] = Phi[np.ix_(coast_steps, IN_PLANE, IN_PLANE)].reshape(-1, 16)
+    _columns(table, "coast_cross_track")[in_force] = Phi[np.ix_(coast_steps, CROSS_TRACK, CROSS_TRACK)].reshape(-1, 4)
+    _columns(table, "coast_offset")[in_force] = delta[coast_steps] - goal
     period_s = scenario.orbit.period_s
-    _column(table, "time_to_arrival")[in_force] = coast_s / period_s
+    _column(table, "time_to_arrival")[in_force] = coast_steps * scenario.dt_s / period_s
     _column(table, "in_hold")[in_force] = steps >= leg.arrival
     _column(table, "phase")[in_force] = leg.index
     _column(table, "time_left")[in_force] = (leg.end - steps) * scenario.dt_s / period_s
+
+
+def _coasts(scenario: Scenario, count: int) -> tuple[Array, Array]:
+    """Coasting for 0 to count steps by the filter's model, step after step.
+
+    Returns:
+        Transition matrices (count + 1, 6, 6) and the effects of the constant disturbance (count + 1, 6).
+    """
+    step = scenario.filter_model()
+    Phi, delta = np.tile(np.eye(6), (count + 1, 1, 1)), np.zeros((count + 1, 6))
+    for k in range(count):
+        Phi[k + 1] = step.Phi @ Phi[k]
+        delta[k + 1] = step.Phi @ delta[k] + step.delta
+    return Phi, delta
 
 
 def _fill_scores(table: Array, scenario: Scenario, leg: Leg) -> None:

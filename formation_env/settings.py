@@ -120,15 +120,19 @@ def _describe(fault: ErrorDetails, data: Any) -> str:
 def _path(loc: Iterable[str | int], data: Any) -> str:
     """Dotted path of a fault, without the tags that pydantic puts in for unions."""
     parts: list[str] = []
-    *parents, last = [*loc] or ["(top level)"]
-    for part in parents:
+    tagged: Any = None
+    loc = [*loc] or ["(top level)"]
+    for depth, part in enumerate(loc, start=1):
+        if isinstance(data, Mapping) and data.get("kind") == part and data is not tagged:
+            tagged = data
+            continue
         try:
             data = data[part]
         except (KeyError, IndexError, TypeError):
-            continue
+            if depth < len(loc):
+                continue
         parts.append(str(part))
-    tag = isinstance(data, Mapping) and data.get("kind") == last
-    return ".".join(parts if tag else [*parts, str(last)])
+    return ".".join(parts)
 
 
 def load_yaml(path: Path) -> Any:

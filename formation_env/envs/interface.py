@@ -1,6 +1,7 @@
 """What the single and the batched environment have in common: spaces, info, checks."""
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any, Final
 
 import numpy as np
@@ -64,10 +65,10 @@ def check_action(action: Any) -> NDArray[np.float32]:
     """An action as float32 (3,).
 
     Raises:
-        ValueError: wrong shape, or not finite.
+        ValueError: wrong shape, no numbers, or not finite.
     """
-    array = np.asarray(action, np.float32)
-    if array.shape != (3,) or not np.isfinite(array).all():
+    array = _numbers(action, "action")
+    if array.shape != (3,) or not isfinite(sum(array.tolist())):  # faster than numpy for three numbers
         raise ValueError(f"action: must be finite with shape (3,), got shape {array.shape}: {array}")
     return array
 
@@ -76,12 +77,19 @@ def check_actions(actions: Any, num_rows: int) -> NDArray[np.float32]:
     """Actions as float32 (num_rows, 3).
 
     Raises:
-        ValueError: wrong shape, or not finite; then it names the first row that is wrong.
+        ValueError: wrong shape, no numbers, or not finite; then it names the first row that is wrong.
     """
-    array = np.asarray(actions, np.float32)
+    array = _numbers(actions, "actions")
     if array.shape != (num_rows, 3):
         raise ValueError(f"actions: shape must be ({num_rows}, 3), got {array.shape}")
     if not np.isfinite(array).all():
         row = int(np.argmin(np.isfinite(array).all(axis=1)))
         raise ValueError(f"actions: row {row} must be finite, got {array[row]}")
     return array
+
+
+def _numbers(values: Any, name: str) -> NDArray[np.float32]:
+    try:
+        return np.asarray(values, np.float32)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: must be numbers, got {values!r}") from None

@@ -34,6 +34,7 @@ class Simulation:
         self._settings = packing.pack(scenario)
         self._states = np.zeros((tiles, f.STATE_FIELDS * LANES))
         self._scratch = np.zeros(f.TILE_FIELDS * LANES)
+        self._lane_set = (False,) * (1 if num_rows == 1 else LANES)
         self._nominal_start = scenario.start.formation.state(scenario.orbit)
 
     def seed(self, row: int, generator: np.random.Generator) -> None:
@@ -60,7 +61,7 @@ class Simulation:
         if starts is not None:
             places[: self.num_rows] = starts
         program.reset(
-            self._states, self._scratch, self.schedule, self._settings, mask, given, places, observations, self.results
+            self._states, self._scratch, self.schedule, self._settings, mask, given, places, observations, self.results, self._lane_set
         )
 
     def step(self, observations: NDArray[np.float32]) -> None:
@@ -70,7 +71,7 @@ class Simulation:
             observations: (num_rows, SIZE), written.
         """
         program.step(
-            self._states, self._scratch, self.schedule, self._settings, self.actions, observations, self.results
+            self._states, self._scratch, self.schedule, self._settings, self.actions, observations, self.results, self._lane_set
         )
 
     def new_observations(self) -> NDArray[np.float32]:
@@ -84,7 +85,7 @@ class Simulation:
     def state(self, field: int, size: int) -> Array:
         """Copy (num_rows, size) of consecutive state fields."""
         block = self._states[:, field : field + size * LANES].reshape(-1, size, LANES)
-        return block.transpose(0, 2, 1).reshape(-1, size)[: self.num_rows].copy()
+        return block.transpose(0, 2, 1).copy().reshape(-1, size)[: self.num_rows]
 
     def row_state(self, field: int, size: int) -> Array:
         """Copy (size,) of consecutive state fields of the first row."""

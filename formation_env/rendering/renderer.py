@@ -1,0 +1,124 @@
+"""Frames of an environment, one after another, as images or in a window."""
+
+from collections import deque
+from typing import Any, Final
+
+import matplotlib
+import numpy as np
+from matplotlib.backends import BackendFilter, backend_registry
+
+from formation_env.envs.single import FormationEnv
+from formation_env.kernel.simulation import Simulation
+from formation_env.rendering.moment import Moment, read_moment
+from formation_env.rendering.scene import DPI, HEIGHT_PX, WIDTH_PX, Frame, Scene
+from formation_env.scenario import Scenario
+
+TRAIL_PERIODS: Final = 0.5
+PAUSE_S: Final = 1 / FormationEnv.metadata["render_fps"]
+
+
+class Renderer:
+    """Draws a flight.
+
+    A copy or a pickle keeps the trail; it makes a picture and a window of its own when it draws.
+    """
+
+    def __init__(self, scenario: Scenario, render_mode: str) -> None:
+        """Prepare; the first `draw` does the work.
+
+        Args:
+            scenario: what is flown.
+            render_mode: `rgb_array` or `human`.
+
+        Raises:
+            ValueError: another mode.
+        """
+        modes = FormationEnv.metadata["render_modes"]
+        if render_mode not in modes:
+            raise ValueError(f"render_mode: must be one of {modes}, got {render_mode!r}")
+        self._scenario = scenario
+        self._mode = render_mode
+        self._trail: deque[Moment] = deque(maxlen=max(2, scenario.steps(TRAIL_PERIODS)))
+        self._scene: Scene | None = None
+        self._window: Window | None = None
+
+    def draw(self, simulation: Simulation) -> Frame | None:
+        """Draw the first row of a simulation.
+
+        Returns:
+            Image (height, width, 3) in mode `rgb_array`, None in mode `human`.
+
+        Raises:
+            RuntimeError: mode `human` without a display.
+        """
+        if self._mode == "human" and self._window is None:
+            self._window = Window()
+        moment = read_moment(simulation)
+        if not self._trail or self._trail[-1].step != moment.step:
+            self._trail.append(moment)
+        if self._scene is None:
+            self._scene = Scene(self._scenario)
+        trail = np.array([past.truth for past in self._trail])
+        frame = self._scene.draw(moment, trail, np.array([not past.measured for past in self._trail]))
+        if self._window is None:
+            return frame
+        self._window.show(frame)
+        return None
+
+    def restart(self) -> None:
+        """A new episode has begun."""
+        self._trail.clear()
+        if self._scene is not None:
+            self._scene.restart()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return self.__dict__ | {"_scene": None, "_window": None}
+
+
+class Window:
+    """Shows images with pyplot; one that the user has closed stays closed."""
+
+    def __init__(self) -> None:
+        """Open it.
+
+        Raises:
+            RuntimeError: there is no display, or matplotlib has no backend for it.
+        """
+        from matplotlib import pyplot
+
+        backend = matplotlib.get_backend()
+        if backend.lower() in backend_registry.list_builtin(BackendFilter.NON_INTERACTIVE):
+            raise _no_window(f"matplotlib backend {backend!r} has none")
+        try:
+            self._figure = pyplot.figure(figsize=(WIDTH_PX / DPI, HEIGHT_PX / DPI), dpi=DPI)
+        except ImportError as error:
+            raise _no_window(str(error)) from error
+        axes = self._figure.add_axes((0, 0, 1, 1))
+        axes.set_axis_off()
+        self._image = axes.imshow(np.full((HEIGHT_PX, WIDTH_PX, 3), 255, np.uint8))
+        pyplot.show(block=False)
+
+    def show(self, frame: Frame) -> None:
+        """Show an image for a moment."""
+        from matplotlib import pyplot
+
+        if pyplot.fignum_exists(self._figure.number):
+            self._image.set_data(frame)
+            self._figure.canvas.draw_idle()
+            self._figure.canvas.start_event_loop(PAUSE_S)
+
+    def close(self) -> None:
+        """Close it."""
+        from matplotlib import pyplot
+
+        pyplot.close(self._figure)
+
+
+def _no_window(reason: str) -> RuntimeError:
+    return RuntimeError(f"render_mode: 'human' needs a display and a GUI toolkit: {reason}; use 'rgb_array'")
