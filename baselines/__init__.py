@@ -1,1 +1,5 @@
 """Classical guidance and control policies, and the report about them."""
+
+from baselines.registry import POLICIES, make_policy
+
+__all__ = ["POLICIES", "make_policy"]

@@ -29,25 +29,25 @@ _LOG_SERIES: Final = _log_series()
 
 
 @lane
-def to_bits(x: float) -> int:
+def to_bits(x: float) -> np.uint64:
     """The 64 bits of a float, as an unsigned integer."""
-    return np.float64(x).view(np.uint64)  # type: ignore[return-value]
+    return np.float64(x).view(np.uint64)
 
 
 @lane
-def from_bits(word: int) -> float:
+def from_bits(word: np.uint64) -> float:
     """The float with these 64 bits."""
-    return np.uint64(word).view(np.float64)  # type: ignore[return-value]
+    return np.uint64(word).view(np.float64)
 
 
 @lane
-def to_integer(x: float) -> int:
+def to_integer(x: float) -> np.uint64:
     """The whole number nearest to x, 0 <= x < 2^52, as an unsigned integer."""
-    return to_bits(x + _TWO_52) & _MANTISSA  # type: ignore[return-value]
+    return to_bits(x + _TWO_52) & _MANTISSA
 
 
 @lane
-def from_integer(word: int) -> float:
+def from_integer(word: np.uint64) -> float:
     """An unsigned integer below 2^52, as a float."""
     return from_bits(word | _BITS_TWO_52) - _TWO_52
 

@@ -110,11 +110,18 @@ METRICS: Final[dict[str, Callable[[Sums], Array]]] = {
 def episode_metrics(simulation: Simulation) -> dict[str, Array]:
     """Metrics of the rows' episodes up to now, each (num_rows,)."""
     fields = simulation.state(f.SUM_REWARD, (f.STATE_FIELDS * LANES - f.SUM_REWARD) // LANES).T
+    reward, delta_v, error, square, max_error, arrival_error, tolerated, lost = fields
     sums = Sums(
-        simulation.state(f.STEP, 1)[:, 0],
-        *fields[:6],
-        simulation.result(f.POSITION_ERROR).copy(),
-        *fields[6:],
+        steps=simulation.state(f.STEP, 1)[:, 0],
+        reward=reward,
+        delta_v_m_s=delta_v,
+        error_m=error,
+        square_m2=square,
+        max_error_m=max_error,
+        arrival_error_m=arrival_error,
+        final_error_m=simulation.result(f.POSITION_ERROR).copy(),
+        tolerated=tolerated,
+        lost=lost,
         hold_steps=simulation.scenario.hold_s / simulation.scenario.dt_s,
     )
     return {name: metric(sums) for name, metric in METRICS.items()}

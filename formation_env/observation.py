@@ -58,9 +58,17 @@ BLOCKS: Final = (
     Block("phase", 1, "index of the phase", "", "/ number of phases"),
     Block("time_left", 1, "time to the end of the phase", "s", "/ period"),
     Block("sigma_pos", 1, "filter's 1-sigma position error, root mean square of the axes", "m", "log10(/ 1 m) / 3"),
-    Block("sigma_vel", 1, "filter's 1-sigma velocity error, root mean square of the axes", "m/s", "log10(/ 1 mm/s) / 3"),
+    Block(
+        "sigma_vel", 1, "filter's 1-sigma velocity error, root mean square of the axes", "m/s", "log10(/ 1 mm/s) / 3"
+    ),
     Block("measured", 1, "1 if the last measurement arrived, else 0", "", ""),
-    Block("measurement_age", 1, "time since the last measurement that arrived", "s", "log(1 + / dt) / log(1 + period / dt)"),
+    Block(
+        "measurement_age",
+        1,
+        "time since the last measurement that arrived",
+        "s",
+        "log(1 + / dt) / log(1 + period / dt)",
+    ),
 )
 
 
@@ -123,3 +131,14 @@ class ObservationLayout:
     def phase(self, observation: NDArray[np.floating]) -> NDArray[np.intp]:
         """Index of the phase (...)."""
         return np.rint(self.scalar(observation, "phase") * self.num_phases).astype(np.intp)
+
+
+def markdown_table() -> str:
+    """The layout as a Markdown table: index, name, meaning, unit, scale."""
+    lines = ["| index | name | meaning | unit | scale |", "|---|---|---|---|---|"]
+    for block in BLOCKS:
+        first, last = SLICES[block.name].start, SLICES[block.name].stop - 1
+        index = f"{first}" if first == last else f"{first}-{last}"
+        cells = (index, f"`{block.name}`", block.meaning, block.unit, block.scale.replace("|", "\\|"))
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, Array
 from formation_env.observation import ObservationLayout
@@ -59,9 +60,9 @@ def legs(scenario: Scenario) -> list[Leg]:
     return result
 
 
-def leg_reference(scenario: Scenario, leg: Leg, steps: Array) -> Array:
+def leg_reference(scenario: Scenario, leg: Leg, steps: ArrayLike) -> Array:
     """Reference states (..., 6) of a leg at instants (...), in steps: on the way to the arrival and after it."""
-    return leg.phase.formation.reference((steps - leg.arrival) * scenario.dt_s, scenario.orbit)
+    return leg.phase.formation.reference((np.asarray(steps) - leg.arrival) * scenario.dt_s, scenario.orbit)
 
 
 def observation_layout(scenario: Scenario) -> ObservationLayout:
@@ -85,7 +86,7 @@ def build_schedule(scenario: Scenario) -> Array:
     for leg in legs(scenario):
         _fill_plan(table, scenario, leg)
         _fill_scores(table, scenario, leg)
-    times_s = scenario.dt_s * np.arange(len(table))
+    times_s: Array = scenario.dt_s * np.arange(len(table), dtype=float)
     _column(table, "link_closed")[:] = scenario.dropout.closed(times_s)
     for name, left in (("error_price", "price_left"), ("counts", "counts_left")):
         column = _column(table, name)

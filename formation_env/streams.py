@@ -1,5 +1,7 @@
-"""Counter-based random numbers: Threefry-2x64 with 13 rounds (Salmon et al. 2011, "Parallel random numbers: as easy as
-1, 2, 3", the fewest that pass all tests there), and normals by Box & Muller (1958).
+"""Counter-based random numbers.
+
+The generator is Threefry-2x64 with 13 rounds (Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3", the
+fewest that pass all tests there); normals come from it by Box & Muller (1958).
 
 A stream is a 128-bit key. Its numbers depend on (key, episode, step, block) alone, so rows need no shared state, and
 what one row draws never moves another's.
@@ -29,7 +31,7 @@ def stream_key(generator: np.random.Generator) -> NDArray[np.uint64]:
 
 
 @lane
-def _mix(x0: int, x1: int, rotation: int) -> tuple[int, int]:
+def _mix(x0: np.uint64, x1: np.uint64, rotation: int) -> tuple[np.uint64, np.uint64]:
     """One round: add, rotate, exclusive or."""
     x0 = x0 + x1
     left = np.uint64(rotation)
@@ -38,7 +40,7 @@ def _mix(x0: int, x1: int, rotation: int) -> tuple[int, int]:
 
 
 @lane
-def _even_rounds(x0: int, x1: int) -> tuple[int, int]:
+def _even_rounds(x0: np.uint64, x1: np.uint64) -> tuple[np.uint64, np.uint64]:
     x0, x1 = _mix(x0, x1, 16)
     x0, x1 = _mix(x0, x1, 42)
     x0, x1 = _mix(x0, x1, 12)
@@ -46,7 +48,7 @@ def _even_rounds(x0: int, x1: int) -> tuple[int, int]:
 
 
 @lane
-def _odd_rounds(x0: int, x1: int) -> tuple[int, int]:
+def _odd_rounds(x0: np.uint64, x1: np.uint64) -> tuple[np.uint64, np.uint64]:
     x0, x1 = _mix(x0, x1, 16)
     x0, x1 = _mix(x0, x1, 32)
     x0, x1 = _mix(x0, x1, 24)
@@ -54,7 +56,9 @@ def _odd_rounds(x0: int, x1: int) -> tuple[int, int]:
 
 
 @lane
-def threefry2x64(key0: int, key1: int, counter0: int, counter1: int) -> tuple[int, int]:
+def threefry2x64(
+    key0: np.uint64, key1: np.uint64, counter0: np.uint64, counter1: np.uint64
+) -> tuple[np.uint64, np.uint64]:
     """Two random 64-bit words from a 128-bit key and a 128-bit counter."""
     key2 = _PARITY ^ key0 ^ key1
     x0, x1 = counter0 + key0, counter1 + key1
@@ -68,7 +72,7 @@ def threefry2x64(key0: int, key1: int, counter0: int, counter1: int) -> tuple[in
 
 
 @lane
-def uniform_pair(word: int) -> tuple[float, float]:
+def uniform_pair(word: np.uint64) -> tuple[float, float]:
     """Two numbers in (0, 1) from 64 random bits, at the centres of 2^32 equal cells."""
     return (
         (from_integer(word >> _32) + 0.5) * _2_TO_MINUS_32,

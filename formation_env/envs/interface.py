@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from math import isfinite
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
 from gymnasium import spaces
@@ -26,18 +26,19 @@ INFO_SCALARS: Final[dict[str, tuple[int, type]]] = {
     "phase": (f.PHASE, int),
 }
 """Info key: result field, type."""
+_Float32Space = spaces.Space[NDArray[np.float32]]
 TOTALS: Final = "episode_totals"
 START_OPTION: Final = "initial_state"
 
 
-def action_space() -> spaces.Box:
+def action_space() -> spaces.Space[NDArray[np.float32]]:
     """LVLH acceleration in units of max_accel_m_s2."""
-    return spaces.Box(-1.0, 1.0, (3,), np.float32)
+    return cast(_Float32Space, spaces.Box(-1.0, 1.0, (3,), np.float32))
 
 
-def observation_space() -> spaces.Box:
+def observation_space() -> spaces.Space[NDArray[np.float32]]:
     """See `formation_env.observation`."""
-    return spaces.Box(-observation.BOUND, observation.BOUND, (observation.SIZE,), np.float32)
+    return cast(_Float32Space, spaces.Box(-observation.BOUND, observation.BOUND, (observation.SIZE,), np.float32))
 
 
 def read_start(options: Mapping[str, Any] | None, num_rows: int, limits: Limits) -> Array | None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -29,7 +29,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     Reward: see `formation_env.scenario.Reward`. Truncated at the end of the plan; terminated beyond a limit.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "human"], "render_fps": 20}
+    metadata = {"render_modes": ["rgb_array", "human"], "render_fps": 20}
 
     def __init__(self, scenario: str | Path | Scenario = "keeping", render_mode: str | None = None) -> None:
         """Make the environment.
@@ -105,7 +105,9 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _info(self, values: list[float]) -> dict[str, Any]:
         """Info of the last step, from the results (fields,) of the one row."""
-        info: dict[str, Any] = {name: self.simulation.row_state(field, size) for name, (field, size) in interface.INFO_STATES.items()}
+        info: dict[str, Any] = {
+            name: self.simulation.row_state(field, size) for name, (field, size) in interface.INFO_STATES.items()
+        }
         info[interface.INFO_THRUST] = np.array(values[_THRUST : _THRUST + 3])
         for name, (field, kind) in interface.INFO_SCALARS.items():
             info[name] = kind(values[(field - f.RESULTS) // LANES])

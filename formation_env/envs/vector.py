@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -26,7 +26,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
     A row that ends is reset in the same step; its last observation and info are in `final_obs` and `final_info`.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
+    metadata = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}
 
     def __init__(
         self,
@@ -96,7 +96,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             seeds = [None] * self.num_envs if seed is None else seed
         if len(seeds) != self.num_envs:
             raise ValueError(f"seed: a list must have {self.num_envs} elements, got {len(seeds)}")
-        for row in np.flatnonzero(chosen):
+        for row in np.flatnonzero(chosen).tolist():
             if seeds[row] is not None or not self._keyed:
                 self.simulation.seed(row, gymnasium.utils.seeding.np_random(seeds[row])[0])
         self._keyed = True
@@ -148,7 +148,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         infos: dict[str, Any] = {
             name: simulation.state(field, size) for name, (field, size) in interface.INFO_STATES.items()
         }
-        infos[interface.INFO_THRUST] = simulation.results[: 3, : self.num_envs].T.copy()
+        infos[interface.INFO_THRUST] = simulation.results[:3, : self.num_envs].T.copy()
         for name, (field, kind) in interface.INFO_SCALARS.items():
             infos[name] = simulation.result(field).astype(kind)
         return infos | {f"_{name}": np.ones(self.num_envs, bool) for name in infos}

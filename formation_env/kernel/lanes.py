@@ -138,9 +138,7 @@ def dropout(t: Array, i: int, c: Scalars) -> None:
 @lane
 def filter_time_update(t: Array, i: int, model: Model, belief: Belief) -> None:
     """The estimate and its covariance over one step (Ma 2009, eq. 4.74-4.75)."""
-    _propagate(
-        t, i, f.ESTIMATE, model, t[f.COMMAND + i], t[f.COMMAND + LANES + i], t[f.COMMAND + 2 * LANES + i]
-    )
+    _propagate(t, i, f.ESTIMATE, model, t[f.COMMAND + i], t[f.COMMAND + LANES + i], t[f.COMMAND + 2 * LANES + i])
     P = estimation.time_update_4(_load_10(t, f.P_IN_PLANE + i), model.Phi_in_plane, belief.Q_in_plane)
     _store_10(t, f.P_IN_PLANE + i, P)
     p = f.P_CROSS_TRACK + i

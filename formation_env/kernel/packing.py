@@ -6,9 +6,8 @@
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numba.np.unsafe.ndarray import to_fixed_tuple
+from numba.np.unsafe import ndarray as numba_arrays
 
-from formation_env import observation
 from formation_env.dynamics import DiscreteModel
 from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, Array
 from formation_env.estimation import process_noise_covariance, upper_triangle
@@ -66,6 +65,8 @@ class Scalars(NamedTuple):
     per_phase: float
 
 
+to_fixed_tuple: Any = numba_arrays.to_fixed_tuple
+
 MODEL_SIZE: Final = 36
 BELIEF_SIZE: Final = 17
 SCALAR_SIZE: Final = len(Scalars._fields)
@@ -112,7 +113,7 @@ def _model(model: DiscreteModel) -> Model:
         raise ValueError("the dynamics model couples the orbit plane and the cross-track axis")
     return Model(
         Phi_in_plane=model.Phi[np.ix_(IN_PLANE, IN_PLANE)],
-        Gamma_in_plane=model.Gamma[np.ix_(IN_PLANE, [0, 1])],
+        Gamma_in_plane=model.Gamma[IN_PLANE, :2],
         delta_in_plane=model.delta[IN_PLANE],
         Phi_cross_track=model.Phi[np.ix_(CROSS_TRACK, CROSS_TRACK)],
         Gamma_cross_track=model.Gamma[CROSS_TRACK, 2],

@@ -21,9 +21,9 @@ _STATE_SIZE = f.STATE_FIELDS * LANES
 _RESET_BLOCK = 3  # a reset draws from blocks of its own, so that its first measurement is drawn like any other
 
 
-# The stages over one tile. Each is a function of its own, since the compiler loses its grip on larger ones. The length of
-# the tuple `lane_set` says how many of the tile's rows are used: it is part of a type, so known when compiling. A batch
-# uses all LANES, a single environment one.
+# The stages over one tile. Each is a function of its own, since the compiler loses its grip on larger ones. The length
+# of the tuple `lane_set` says how many of the tile's rows are used: it is part of a type, so known when compiling. A
+# batch uses all LANES, a single environment one.
 
 
 @stage
@@ -80,7 +80,7 @@ def _observe(t: Array, lane_set: LaneSet, c: packing.Scalars) -> None:
 
 
 @stage
-def _begin(t: Array, lane_set: LaneSet, given: Array, c: packing.Scalars) -> None:
+def _begin(t: Array, lane_set: LaneSet, given: NDArray[np.bool_], c: packing.Scalars) -> None:
     for i in range(len(lane_set)):
         lanes.begin(t, i, given[i], c)
 
@@ -91,6 +91,7 @@ def _read_plan(t: Array, lane_set: LaneSet, schedule: Array, known_step: int) ->
 
     Args:
         t: the tile.
+        lane_set: as long as the rows used of the tile.
         schedule: the table.
         known_step: the step whose row the whole tile holds, or -1.
 
@@ -119,7 +120,7 @@ def _compile(source_hash: int) -> tuple[Any, Any]:
     """
     compiled = numba.njit(cache=True, fastmath=FAST_MATH, error_model="numpy")
 
-    @compiled  # type: ignore[untyped-decorator]
+    @compiled
     def step(
         states: Array,
         t: Array,
@@ -172,7 +173,7 @@ def _compile(source_hash: int) -> tuple[Any, Any]:
                     results[k, first + i] = t[f.RESULTS + k * LANES + i]
         return source_hash
 
-    @compiled  # type: ignore[untyped-decorator]
+    @compiled
     def reset(
         states: Array,
         t: Array,

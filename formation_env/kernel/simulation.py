@@ -43,9 +43,7 @@ class Simulation:
         for field, value in ((f.KEY, key[0]), (f.KEY + LANES, key[1]), (f.EPISODE, -1.0)):
             self._states[row // LANES, field + row % LANES] = value
 
-    def reset(
-        self, chosen: NDArray[np.bool_], observations: NDArray[np.float32], starts: Array | None = None
-    ) -> None:
+    def reset(self, chosen: NDArray[np.bool_], observations: NDArray[np.float32], starts: Array | None = None) -> None:
         """Begin the next episode of some rows.
 
         Args:
@@ -61,7 +59,16 @@ class Simulation:
         if starts is not None:
             places[: self.num_rows] = starts
         program.reset(
-            self._states, self._scratch, self.schedule, self._settings, mask, given, places, observations, self.results, self._lane_set
+            self._states,
+            self._scratch,
+            self.schedule,
+            self._settings,
+            mask,
+            given,
+            places,
+            observations,
+            self.results,
+            self._lane_set,
         )
 
     def step(self, observations: NDArray[np.float32]) -> None:
@@ -71,7 +78,14 @@ class Simulation:
             observations: (num_rows, SIZE), written.
         """
         program.step(
-            self._states, self._scratch, self.schedule, self._settings, self.actions, observations, self.results, self._lane_set
+            self._states,
+            self._scratch,
+            self.schedule,
+            self._settings,
+            self.actions,
+            observations,
+            self.results,
+            self._lane_set,
         )
 
     def new_observations(self) -> NDArray[np.float32]:

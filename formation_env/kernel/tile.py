@@ -15,7 +15,7 @@ _next_field = 0
 def _field(size: int = 1) -> int:
     """Offset of a new field of `size` values per row."""
     global _next_field
-    offset = _next_field * LANES
+    offset: int = _next_field * LANES
     _next_field += size
     return offset
 
@@ -64,11 +64,12 @@ NUM_RESULTS: Final = _next_field - RESULTS // LANES
 OBSERVATION: Final = _field(observation.SIZE)
 TILE_FIELDS: Final = _next_field
 
+
 def plan(name: str) -> int:
     """Offset of a column of the schedule."""
-    return PLAN + schedule.OFFSETS[name] * LANES
+    return int(PLAN + schedule.OFFSETS[name] * LANES)
 
 
 def seen(name: str) -> int:
     """Offset of a block of the observation."""
-    return OBSERVATION + observation.SLICES[name].start * LANES
+    return int(OBSERVATION + observation.SLICES[name].start * LANES)

@@ -69,14 +69,16 @@ class Plan:
     Attributes:
         centre: of all references, start and leader (3,), m.
         half_m: half the width that shows them all, m.
+        legs: the phases on the clock.
+        paths: reference positions (points, 3) of each leg, m.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self.legs = legs(scenario)
-        self._paths = [self._path(leg) for leg in self.legs]
+        self.paths = [self._path(leg) for leg in self.legs]
         start = scenario.start.formation.state(scenario.orbit)[:3]
-        points = np.vstack([*self._paths, start, np.zeros(3)])
+        points = np.vstack([*self.paths, start, np.zeros(3)])
         low, high = points.min(axis=0), points.max(axis=0)
         self.centre = (low + high) / 2
         self.half_m = MARGIN * max(float((high - low).max()) / 2, 4 * scenario.tolerance_m)
@@ -95,7 +97,3 @@ class Plan:
     def reference(self, step: int) -> Array:
         """Reference position (3,) at an instant, m."""
         return leg_reference(self._scenario, self.leg(step), np.asarray(step))[:3]
-
-    def path(self, step: int) -> Array:
-        """Reference positions (points, 3) of the leg that `leg` gives, m."""
-        return self._paths[self.leg(step).index]

@@ -1,11 +1,11 @@
 """Frames of an environment, one after another, as images or in a window."""
 
 from collections import deque
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import matplotlib
 import numpy as np
-from matplotlib.backends import BackendFilter, backend_registry
+from matplotlib.backends.registry import BackendFilter, backend_registry
 
 from formation_env.envs.single import FormationEnv
 from formation_env.kernel.simulation import Simulation
@@ -92,8 +92,8 @@ class Window:
         """
         from matplotlib import pyplot
 
-        backend = matplotlib.get_backend()
-        if backend.lower() in backend_registry.list_builtin(BackendFilter.NON_INTERACTIVE):
+        backend, registry = matplotlib.get_backend(), cast(Any, backend_registry)
+        if backend.lower() in registry.list_builtin(BackendFilter.NON_INTERACTIVE):
             raise _no_window(f"matplotlib backend {backend!r} has none")
         try:
             self._figure = pyplot.figure(figsize=(WIDTH_PX / DPI, HEIGHT_PX / DPI), dpi=DPI)

@@ -1,6 +1,6 @@
 """The whole picture: two views of the formation, two close-ups of the follower, and what there is to say about them."""
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -16,92 +16,103 @@ from formation_env.dynamics.base import Array
 from formation_env.rendering.moment import Moment, Plan
 from formation_env.rendering.views import GREEN, GREY, RED, STYLES, View
 from formation_env.scenario import Scenario
+from formation_env.schedule import Leg
 
 Frame = NDArray[np.uint8]
 
 WIDTH_PX: Final = 960
 HEIGHT_PX: Final = 540
 DPI: Final = 100
-CLOSE_UP_TOLERANCES: Final = 4.0
+CLOSE_UP_TOLERANCES: Final = 1.25
 """Half a close-up's width, in tolerances of the scenario."""
+TITLE_CHARACTERS: Final = 80
+"""Longer titles are printed smaller."""
 
 # Place of each view, px from the lower left: left, bottom, size; what points upward; whether it is a close-up; title.
 _VIEWS: Final = (
-    (62, 92, 322, 0, False, "Orbit plane, from the side"),
-    (446, 92, 322, 2, False, "Local horizontal, from above"),
-    (826, 278, 128, 0, True, "Follower, close up"),
-    (826, 92, 128, 2, True, ""),
+    (58, 86, 330, 0, False, "Orbit plane, from the side"),
+    (440, 86, 330, 2, False, "Local horizontal, from above"),
+    (828, 286, 116, 0, True, "Close-up"),
+    (828, 106, 116, 2, True, ""),
 )
+# Place of each number, px from the left, and its heading.
+_NUMBERS: Final = (
+    (18, "time"),
+    (112, "orbits"),
+    (382, "time left"),
+    (476, "position error"),
+    (588, "filter 1σ"),
+    (674, "thrust"),
+    (776, "Δv used"),
+)
+_PHASE_LEFT_PX: Final = 176
 
 
 class Scene:
     """The picture of a scenario, drawn again and again.
 
-    Axes, grids and legend are drawn once and kept; a frame puts what moves on top of them.
+    Axes, grids, headings and the reference path are drawn once per phase and kept; a frame puts what moves on top.
     """
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
         self._plan = Plan(scenario)
         self._figure = Figure(figsize=(WIDTH_PX / DPI, HEIGHT_PX / DPI), dpi=DPI, facecolor="white")
-        self._canvas = FigureCanvasAgg(self._figure)
+        self._canvas: Any = FigureCanvasAgg(self._figure)
         self._views = [View(self._axes(*place), up, close_up) for *place, up, close_up, _ in _VIEWS]
-        for view, (*_, title) in zip(self._views, _VIEWS, strict=True):
-            view.axes.set_title(title, fontsize=9, color=GREY, pad=4)
-        self._clock = self._text(18, 490, 11)
-        self._numbers = self._text(18, 464, 11, family="DejaVu Sans Mono", weight="bold")
-        self._link = self._text(WIDTH_PX - 18, 516, 11, ha="right", weight="bold")
-        self._border = Rectangle((0, 0), 1, 1, transform=self._figure.transFigure, fill=False, ec=RED, lw=7)
+        self._numbers = [self._number(left, heading) for left, heading in _NUMBERS]
+        self._phase = self._number(_PHASE_LEFT_PX, "phase")
+        self._link = self._text(WIDTH_PX - 18, 518, 11, ha="right", weight="bold")
+        self._border = Rectangle((0, 0), 1, 1, transform=self._figure.transFigure, fill=False, ec=RED, lw=8)
         self._figure.add_artist(self._border)
-        self._moving: list[Artist] = [self._clock, self._numbers, self._link, self._border]
-        self._moving += [artist for view in self._views for artist in view.artists]
+        self._moving: list[Artist] = [artist for view in self._views for artist in view.moving]
+        self._moving += [*self._numbers, self._border, self._link]
         for artist in self._moving:
             artist.set_animated(True)
-        self._text(18, 518, 13, weight="bold").set_text(scenario.title)
-        self._legend()
+        self._write_titles()
         self.restart()
 
     def _axes(self, left: float, bottom: float, size: float) -> Axes:
-        axes = self._figure.add_axes(
-            (left / WIDTH_PX, bottom / HEIGHT_PX, size / WIDTH_PX, size / HEIGHT_PX), label=f"{left} {bottom}"
-        )
+        rectangle = (left / WIDTH_PX, bottom / HEIGHT_PX, size / WIDTH_PX, size / HEIGHT_PX)
+        axes = self._figure.add_axes(rectangle)
         axes.tick_params(labelsize=8)
-        axes.xaxis.label.set_size(9)
-        axes.yaxis.label.set_size(9)
         return axes
 
-    def _text(
-        self, x: float, y: float, size: float, ha: str = "left", weight: str = "normal", family: str = "DejaVu Sans"
-    ) -> Text:
-        return self._figure.text(
-            x / WIDTH_PX, y / HEIGHT_PX, "", fontsize=size, ha=ha, va="center", fontweight=weight, family=family
-        )
+    def _text(self, x: float, y: float, size: float, text: str = "", ha: str = "left", weight: str = "normal") -> Text:
+        place = (x / WIDTH_PX, y / HEIGHT_PX)
+        return self._figure.text(*place, text, fontsize=size, ha=ha, va="center", fontweight=weight, parse_math=False)
 
-    def _legend(self) -> None:
-        """One line below the views."""
+    def _number(self, left: float, heading: str) -> Text:
+        self._text(left, 486, 8.5, heading).set_color(GREY)
+        return self._text(left, 466, 10.5, weight="bold")
+
+    def _write_titles(self) -> None:
+        """The scenario's title, the views' and the legend, which is one line below the views."""
+        title = self._scenario.title
+        self._text(18, 518, 13 * min(1, TITLE_CHARACTERS / max(len(title), 1)), title, weight="bold")
+        for view, (*_, name) in zip(self._views, _VIEWS, strict=True):
+            view.axes.set_title(name, fontsize=9, color=GREY, pad=4)
         full_mm_s2 = 1000 * self._scenario.spacecraft.max_accel_m_s2
-        thrust = {
-            "color": GREEN,
-            "marker": r"$\rightarrow$",
-            "ls": "",
-            "ms": 13,
-            "label": f"thrust ≤ {full_mm_s2:g} mm/s²",
-        }
+        label = f"thrust (√ scale, full {full_mm_s2:g} mm/s²)"
+        thrust = {"color": GREEN, "marker": r"$\rightarrow$", "ls": "", "ms": 13, "label": label}
         lines = [Line2D([], [], **style) for style in (*STYLES.values(), thrust) if "label" in style]
+        spacing = {"handletextpad": 0.4, "columnspacing": 1.2, "handlelength": 1.4, "borderaxespad": 0.5}
         self._figure.legend(
-            handles=lines, loc="lower center", ncols=len(lines), frameon=False, fontsize=8.5, borderaxespad=0.4,
-            handletextpad=0.4, columnspacing=1.3, handlelength=1.4,
+            handles=lines, loc="lower center", ncols=len(lines), frameon=False, fontsize=8.5, **spacing
         )  # fmt: skip
 
     def restart(self) -> None:
-        """Show the whole plan again."""
+        """Show the whole plan again, from its first phase."""
         self._half_m = self._plan.half_m
-        self._draw_background()
+        self._draw_background(self._plan.legs[0])
 
-    def _draw_background(self) -> None:
+    def _draw_background(self, leg: Leg) -> None:
+        self._leg = leg
+        self._phase.set_text(f"{leg.index + 1}/{len(self._plan.legs)}: {leg.phase.formation.kind.replace('_', ' ')}")
         close_up_m = CLOSE_UP_TOLERANCES * self._scenario.tolerance_m
-        for view, (_, _, _, _, close_up, _) in zip(self._views, _VIEWS, strict=True):
-            view.limit(*((np.zeros(3), close_up_m) if close_up else (self._plan.centre, self._half_m)))
+        for view, (*_, close_up, _) in zip(self._views, _VIEWS, strict=True):
+            limits = (np.zeros(3), close_up_m) if close_up else (self._plan.centre, self._half_m)
+            view.prepare(*limits, self._plan.paths[leg.index])
         self._canvas.draw()
         self._background = self._canvas.copy_from_bbox(self._figure.bbox)
 
@@ -116,48 +127,45 @@ class Scene:
         Returns:
             Image (HEIGHT_PX, WIDTH_PX, 3).
         """
-        self._zoom_out(moment.truth)
-        reference, path = self._plan.reference(moment.step), self._plan.path(moment.step)
+        self._keep_up(moment)
+        reference = self._plan.reference(moment.step)
         for view in self._views:
-            view.show(moment, reference, path, trail, lost, self._scenario.tolerance_m)
-        self._clock.set_text(self._clock_line(moment))
-        self._numbers.set_text(_numbers_line(moment))
+            view.show(moment, reference, trail, lost, self._scenario.tolerance_m)
+        for text, number in zip(self._numbers, self._values(moment), strict=True):
+            text.set_text(number)
         self._show_link(moment)
         self._canvas.restore_region(self._background)
         for artist in self._moving:
             self._figure.draw_artist(artist)
-        return np.array(self._canvas.buffer_rgba())[..., :3].copy()
+        return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
-    def _zoom_out(self, position: Array) -> None:
-        """Double the views until the follower is inside."""
-        distance_m = float(np.abs(position - self._plan.centre).max())
-        if distance_m > self._half_m:
-            self._half_m *= 2.0 ** np.ceil(np.log2(distance_m / self._half_m))
-            self._draw_background()
+    def _keep_up(self, moment: Moment) -> None:
+        """A new background for a new phase, and when the follower has left the views: they double."""
+        distance_m = float(np.abs(moment.truth - self._plan.centre).max())
+        leg, doublings = self._plan.leg(moment.step), np.ceil(np.log2(max(distance_m / self._half_m, 1.0)))
+        if leg is not self._leg or doublings > 0:
+            self._half_m *= 2.0**doublings
+            self._draw_background(leg)
 
-    def _clock_line(self, moment: Moment) -> str:
-        leg, dt_s, period_s = self._plan.leg(moment.step), self._scenario.dt_s, self._scenario.orbit.period_s
-        on_the_way = moment.step < leg.arrival
-        left_s = ((leg.arrival if on_the_way else leg.end) - moment.step) * dt_s
-        doing, ending = ("transfer to", "to arrival") if on_the_way else ("hold", "left")
-        time_s = moment.step * dt_s
-        return (
-            f"t = {time_s:.0f} s ({time_s / period_s:.2f} orbits)   phase {leg.index + 1} of {len(self._plan.legs)}: "
-            f"{doing} {leg.phase.formation.kind.replace('_', ' ')}, {left_s:.0f} s {ending}"
-        )
+    def _values(self, moment: Moment) -> list[str]:
+        """Texts of `_NUMBERS`."""
+        dt_s, period_s = self._scenario.dt_s, self._scenario.orbit.period_s
+        goal = self._leg.arrival if moment.step < self._leg.arrival else self._leg.end
+        sigma_m = np.sqrt(np.trace(moment.covariance) / 3)
+        accel_mm_s2 = 1000 * self._scenario.spacecraft.max_accel_m_s2 * np.linalg.norm(moment.thrust)
+        return [
+            f"{moment.step * dt_s:.0f} s",
+            f"{moment.step * dt_s / period_s:.2f}",
+            f"{(goal - moment.step) * dt_s:.0f} s",
+            f"{moment.position_error_m:.1f} m",
+            f"{sigma_m:.1f} m",
+            f"{accel_mm_s2:.2f} mm/s²",
+            f"{moment.delta_v_m_s:.3f} m/s",
+        ]
 
     def _show_link(self, moment: Moment) -> None:
+        """A frame and a badge while measurements are lost."""
         self._border.set_visible(not moment.measured)
-        if moment.measured:
-            self._link.set(text="link up", color=GREY, bbox={"fc": "none", "ec": GREY, "boxstyle": "round,pad=0.4"})
-        else:
-            box = {"fc": RED, "ec": RED, "boxstyle": "round,pad=0.4"}
-            self._link.set(text=f"LINK LOST  {moment.age_s:.0f} s", color="white", bbox=box)
-
-
-def _numbers_line(moment: Moment) -> str:
-    sigma_m = float(np.sqrt(np.trace(moment.covariance) / 3))
-    return (
-        f"position error {moment.position_error_m:8.1f} m   filter 1σ {sigma_m:6.1f} m   "
-        f"Δv used {moment.delta_v_m_s:7.3f} m/s"
-    )
+        text = "LINK UP" if moment.measured else f"LINK LOST  {moment.age_s:.0f} s"
+        fill, edge, color = ("white", GREY, GREY) if moment.measured else (RED, RED, "white")
+        self._link.set(text=text, color=color, bbox={"fc": fill, "ec": edge, "boxstyle": "round,pad=0.4"})

@@ -1,0 +1,148 @@
+"""A training run's folder: what is in it, and how a model is saved to it and loaded from it."""
+
+import json
+import platform
+from dataclasses import asdict
+from importlib import metadata
+from pathlib import Path
+from typing import Annotated, Any, Final
+from zipfile import BadZipFile, is_zipfile
+
+from pydantic import Field, Strict
+
+from agents.files import replacing, write_text
+from agents.settings import SETTINGS, AgentSettings, Algorithm
+from formation_env.scenario import Scenario
+from formation_env.settings import ConfigError, Text, build, settings
+
+MODEL: Final = "model.zip"
+"""The model that was best on the validation seeds."""
+LAST_MODEL: Final = "last.zip"
+RUN: Final = "settings.json"
+CURVE: Final = "validation.csv"
+TENSORBOARD: Final = "tensorboard"
+
+LIBRARIES: Final = ("formation-env", "gymnasium", "numpy", "stable-baselines3", "torch")
+
+
+@settings
+class Run:
+    """All that made a run, so that it can be redone and its models need nothing else.
+
+    Attributes:
+        algorithm: which.
+        env: the environment as it was asked for.
+        seed: of the training.
+        steps: environment steps to train for.
+        validation_episodes: episodes of each validation.
+        validations: validations, evenly over the run.
+        threads: of torch; other numbers give other rounding.
+        agent: the hyperparameters.
+        scenario: what is flown.
+        command: the command line.
+        versions: of the libraries.
+    """
+
+    algorithm: Algorithm
+    env: Text
+    seed: Annotated[int, Strict(), Field(ge=0)] = 0
+    steps: Annotated[int, Strict(), Field(ge=1)]
+    validation_episodes: Annotated[int, Strict(), Field(ge=2)] = 64
+    validations: Annotated[int, Strict(), Field(ge=1)] = 20
+    threads: Annotated[int, Strict(), Field(ge=1)] = 1
+    agent: AgentSettings
+    scenario: Scenario
+    command: Text = ""
+    versions: dict[str, str] = Field(default_factory=dict)
+
+
+def library_versions() -> dict[str, str]:
+    """Versions of the interpreter and of the libraries behind a model."""
+    return {"python": platform.python_version()} | {name: metadata.version(name) for name in LIBRARIES}
+
+
+def start_run(run: Run, folder: Path) -> None:
+    """Make a run's folder and write its settings.
+
+    Raises:
+        ConfigError: the folder holds a run already.
+        OSError: it cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    if (folder / RUN).exists():
+        raise ConfigError(f"{folder}: holds a run already; give another folder, or remove this one")
+    write_text(folder / RUN, json.dumps(asdict(run), indent=2) + "\n")
+
+
+def load_run(folder: Path) -> Run:
+    """A run's settings.
+
+    Raises:
+        ConfigError: no run is there, or its settings are wrong; one line.
+    """
+    path = folder / RUN
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise ConfigError(f"{path}: no valid JSON: {error}") from None
+    if isinstance(data, dict) and data.get("algorithm") in SETTINGS:
+        data["agent"] = build(SETTINGS[data["algorithm"]], data.get("agent"), f"{path}: agent")
+    return build(Run, data, str(path))
+
+
+def save_model(model: Any, path: Path) -> None:
+    """Save an SB3 model at once: interrupted, it leaves the old one.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    with replacing(path) as temporary:
+        model.save(temporary)
+
+
+class LearnedPolicy:
+    """A trained model as a policy, deterministic unless asked otherwise.
+
+    Attributes:
+        scenario: what it was trained on.
+        settings: its hyperparameters.
+    """
+
+    def __init__(self, run: Run, model: Any) -> None:
+        self.scenario = run.scenario
+        self.settings = run.agent
+        self._policy = model.policy
+
+    def predict(
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Any, Any]:
+        """Actions (3,) or (rows, 3), in units of max_accel_m_s2, for one observation or a batch; and `state`."""
+        actions, _ = self._policy.predict(observation, deterministic=deterministic)
+        return actions, state
+
+
+def load_policy(folder: str | Path, name: str = MODEL) -> LearnedPolicy:
+    """The policy of a training run. SB3's files hold pickled objects, so load only files that you trust.
+
+    Args:
+        folder: the run's.
+        name: `model.zip`, the best on the validation seeds, or `last.zip`.
+
+    Raises:
+        ConfigError: no run or no model is there, or the file is damaged; one line.
+    """
+    from agents.models import CLASSES
+
+    run, path = load_run(Path(folder)), Path(folder) / name
+    if not path.is_file():
+        raise ConfigError(f"{path}: no such file; the run has saved no model")
+    if not is_zipfile(path):
+        raise ConfigError(f"{path}: damaged, or no model")
+    try:
+        # A policy needs no memory of transitions.
+        model = CLASSES[run.algorithm].load(path, device="cpu", custom_objects={"buffer_size": 1})
+    except (BadZipFile, KeyError, EOFError) as error:
+        raise ConfigError(f"{path}: damaged, or no model: {error}") from None
+    return LearnedPolicy(run, model)

@@ -1,0 +1,136 @@
+"""Stable-Baselines3's VecEnv over the batched environment: all rows are stepped by one call."""
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
+
+from formation_env.envs import FormationVectorEnv, interface
+from formation_env.evaluation import scenario_of
+from formation_env.scenario import Scenario
+
+Infos = list[dict[str, Any]]
+Row = dict[str, Any]
+
+
+class FormationVecEnv(VecEnv):
+    """Rows of a `FormationVectorEnv` as Stable-Baselines3 wants them.
+
+    The info of a row is empty but at the end of its episode; then it has `terminal_observation`,
+    `TimeLimit.truncated` (the formation goes on, so the value of the last observation counts), `episode` as SB3's
+    Monitor gives it (return `r` in m/s, not scaled, length `l`, seconds `t`), and `episode_totals` (metrics by name).
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        scenario: str | Path | Scenario,
+        reward_scale: float = 1.0,
+        stagger: bool = False,
+    ) -> None:
+        """Make the environment.
+
+        Args:
+            num_envs: rows.
+            scenario: a registered id, a scenario's name or path, or a Scenario.
+            reward_scale: rewards are multiplied by this, units per m/s.
+            stagger: begin the rows' episodes evenly spread over an episode's length, not all at once, so that each
+                rollout sees all parts of the mission. Until a row's first end it is where coasting took it.
+        """
+        self.batch = FormationVectorEnv(num_envs, scenario_of(scenario))
+        self.reward_scale = reward_scale
+        self.stagger = stagger
+        self._actions = np.zeros((num_envs, 3), np.float32)
+        self._birth_s = time.perf_counter()
+        super().__init__(num_envs, self.batch.single_observation_space, self.batch.single_action_space)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin an episode in all rows, with the seeds and options given since the last reset, which count once."""
+        observations, _ = self.batch.reset(seed=self._seeds, options=self._batch_options())
+        self._reset_seeds()
+        self._reset_options()
+        return self._spread(observations) if self.stagger else observations
+
+    def _batch_options(self) -> dict[str, Any] | None:
+        """The rows' options as one; an option is given to all rows or to none."""
+        keys = {key for options in self._options for key in options}
+        for key in keys:
+            if not all(key in options for options in self._options):
+                raise ValueError(f"reset options: {key} must be given to all rows or to none")
+        return {key: np.stack([options[key] for options in self._options]) for key in keys} or None
+
+    def _spread(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Coast for an episode, and on the way begin the rows' next episodes one after the other."""
+        length = self.batch.scenario.num_steps
+        begins = np.arange(self.num_envs) * length // self.num_envs
+        coast = np.zeros((self.num_envs, 3), np.float32)
+        for step in range(length):
+            chosen = begins == step
+            if step and chosen.any():
+                self.batch.reset(options={"reset_mask": chosen})
+            observations = self.batch.step(coast)[0]
+        return observations
+
+    def step_async(self, actions: NDArray[np.float32]) -> None:
+        """Keep the actions (num_envs, 3) for `step_wait`."""
+        self._actions = actions
+
+    def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], Infos]:
+        """Fly one step in all rows; rows that end begin their next episode."""
+        observations, rewards, terminations, truncations, batch_infos = self.batch.step(self._actions)
+        ended = terminations | truncations
+        infos: Infos = [{} for _ in range(self.num_envs)]
+        for row in np.flatnonzero(ended):
+            infos[row] = self._last_info(batch_infos, int(row))
+            infos[row]["TimeLimit.truncated"] = bool(truncations[row] and not terminations[row])
+        return observations, (self.reward_scale * rewards).astype(np.float32), ended, infos
+
+    def _last_info(self, infos: dict[str, Any], row: int) -> Row:
+        """What SB3 wants to know of a row's episode that has ended."""
+        totals = infos["final_info"][interface.TOTALS]
+        totals = {name: float(values[row]) for name, values in totals.items() if not name.startswith("_")}
+        age_s = round(time.perf_counter() - self._birth_s, 6)
+        return {
+            "terminal_observation": infos["final_obs"][row],
+            "episode": {"r": totals["return"], "l": int(totals["steps"]), "t": age_s},
+            interface.TOTALS: totals,
+        }
+
+    def close(self) -> None:
+        """Close the batched environment."""
+        self.batch.close()
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """An attribute of the batched environment, once for each row asked for: the rows share it."""
+        return [getattr(self.batch, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
+        """Set an attribute of the batched environment; of all rows, since they share it."""
+        self._all_rows("set_attr", attr_name, indices)
+        setattr(self.batch, attr_name, value)
+
+    def env_method(  # the base class's signature
+        self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """Call a method of the batched environment, once; its result is given for each row."""
+        self._all_rows("env_method", method_name, indices)
+        return [getattr(self.batch, method_name)(*method_args, **method_kwargs)] * self.num_envs
+
+    def _all_rows(self, what: str, name: str, indices: VecEnvIndices) -> None:
+        if sorted(self._get_indices(indices)) != list(range(self.num_envs)):
+            raise ValueError(f"{what}: {name}: the rows share one environment, so indices must be all of them or None")
+
+    def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
+        """Whether the rows are wrapped: as by Monitor, whose part is done here; by nothing else."""
+        from stable_baselines3.common.monitor import Monitor
+
+        return [issubclass(wrapper_class, Monitor) for _ in self._get_indices(indices)]
+
+    def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
+        """No pictures: render a single environment instead."""
+        return [None] * self.num_envs

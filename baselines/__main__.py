@@ -1,0 +1,12 @@
+"""Command line of the classical policies."""
+
+import typer
+
+from baselines.tuning import tune
+
+app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False)
+app.callback()(lambda: None)  # so that a single command keeps its name
+app.command()(tune)
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,9 @@
+"""The evaluation report: policies flown on the same seeds, as tables and one self-contained HTML page.
+
+`write_report` takes any policies by name, so learned ones stand beside the classical ones.
+"""
+
+from baselines.report.flights import Flown, PolicyFactory
+from baselines.report.write import FILES, write_report
+
+__all__ = ["FILES", "Flown", "PolicyFactory", "write_report"]

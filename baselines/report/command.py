@@ -1,0 +1,70 @@
+"""The command `report`."""
+
+import shlex
+import signal
+import sys
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from baselines.registry import POLICIES, make_policy
+from formation_env.envs import ENV_IDS
+from formation_env.settings import ConfigError
+
+if TYPE_CHECKING:
+    from baselines.report.flights import PolicyFactory
+
+Envs = Annotated[list[str] | None, typer.Option("--env", help="Id, scenario name or YAML file; may be repeated.")]
+Policies = Annotated[list[str] | None, typer.Option("--policy", help="Name of a policy; may be repeated.")]
+Episodes = Annotated[int, typer.Option(min=1, help="Episodes per policy and environment.")]
+Out = Annotated[Path, typer.Option(file_okay=False, help="Folder to write to.")]
+
+
+def report(env: Envs = None, policy: Policies = None, episodes: Episodes = 100, out: Out = Path("reports")) -> None:
+    """Fly the classical policies on the same seeds, and write tables and an HTML page."""
+    policies = {name: partial(make_policy, name) for name in policy or POLICIES}
+    run_report(policies, env or list(ENV_IDS), episodes, out, "baselines")
+
+
+def run_report(
+    policies: "Mapping[str, PolicyFactory]", envs: Sequence[str], episodes: int, out: Path, package: str
+) -> None:
+    """Write the report, and end the program with one line if that fails.
+
+    Args:
+        policies: label -> factory, see `baselines.report.write_report`.
+        envs: ids, names or files of scenarios.
+        episodes: seeds per environment.
+        out: folder to write to.
+        package: whose command line this is.
+
+    Raises:
+        SystemExit: 1 after a failure, 130 after an interrupt.
+    """
+    signal.signal(signal.SIGTERM, _interrupt)
+    command = shlex.join(["python", "-m", package, *sys.argv[1:]])
+    try:
+        from baselines.report import write_report
+
+        page = write_report(policies, envs, episodes, out, command)
+    except KeyboardInterrupt:
+        _end("report: interrupted, nothing written", 130)
+    except ModuleNotFoundError as error:
+        _end(f"report: needs {error.name}; install it with: pip install 'formation-env[report]'", 1)
+    except ConfigError as error:
+        _end(str(error), 1)
+    except OSError as error:
+        _end(f"report: {out}: cannot be written: {error.strerror or error}", 1)
+    typer.echo(f"wrote {page}")
+
+
+def _interrupt(*_: Any) -> NoReturn:
+    raise KeyboardInterrupt
+
+
+def _end(message: str, code: int) -> NoReturn:
+    typer.echo(message, err=True)
+    raise SystemExit(code)

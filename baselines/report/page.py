@@ -1,0 +1,150 @@
+"""The HTML page: one file that needs no network."""
+
+from typing import Any
+
+import jinja2
+import plotly.io
+from markupsafe import Markup
+from plotly.graph_objects import Figure
+from plotly.offline import get_plotlyjs
+
+from baselines.report import style
+from baselines.report.flight_figures import time_figure
+from baselines.report.results import Results, number, numbers, reading, significant
+from baselines.report.scene_figure import scene_figure
+from baselines.report.score_figures import Looks, cost_figure, trade_figure
+from formation_env.metrics import METRICS
+
+# Metric: heading, unit, factor.
+COLUMNS: dict[str, tuple[str, str, float]] = {
+    "return": ("return", "m/s", 1.0),
+    "delta_v_m_s": ("Δv", "m/s", 1.0),
+    "position_error_mean_m": ("mean error", "m", 1.0),
+    "position_error_rms_m": ("rms error", "m", 1.0),
+    "position_error_max_m": ("max error", "m", 1.0),
+    "position_error_arrival_m": ("arrival error", "m", 1.0),
+    "position_error_final_m": ("final error", "m", 1.0),
+    "in_tolerance": ("in tolerance", "% of hold", 100.0),
+    "measurements_lost": ("measurements lost", "%", 100.0),
+}
+_NEVER_BEST = ("measurements_lost",)
+
+
+def render(results: list[Results], data: dict[str, Any]) -> str:
+    """The page of all environments.
+
+    Args:
+        results: what to show.
+        data: the report as data (`baselines.report.document`).
+    """
+    policies = list(dict.fromkeys(name for item in results for name in item.flown.episodes))
+    looks = style.looks(policies)
+    loader = jinja2.PackageLoader("baselines.report")
+    environment = jinja2.Environment(
+        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.get_template("page.html.jinja").render(
+        data=data,
+        policies=policies,
+        colors={name: look.color for name, look in looks.items()},
+        overview=[_overview(item, policies) for item in results],
+        sections=[_section(index, item, looks, data) for index, item in enumerate(results)],
+        plotly_js=Markup(get_plotlyjs()),
+        css=Markup(_css(loader, environment)),
+    )
+
+
+def _css(loader: jinja2.PackageLoader, environment: jinja2.Environment) -> str:
+    return loader.get_source(environment, "page.css")[0]
+
+
+def _overview(results: Results, policies: list[str]) -> dict[str, Any]:
+    """A line of the first table: mean cost of each policy on one environment."""
+    costs = {name: numbers(results.interval(name, "return"), -1)[0] for name in results.flown.episodes}
+    return {"label": results.flown.label, "best": results.best, "costs": [(name, costs.get(name)) for name in policies]}
+
+
+def _section(index: int, results: Results, looks: Looks, data: dict[str, Any]) -> dict[str, Any]:
+    """All that the template shows of one environment."""
+    flown = results.flown
+    details = data["environments"][flown.label]
+    figures = {
+        "cost": cost_figure(results, looks),
+        "trade": trade_figure(results, looks),
+        "time": time_figure(results, looks),
+        "scene": scene_figure(results, looks),
+    }
+    return {
+        "anchor": f"env-{index}",
+        "label": flown.label,
+        "title": flown.scenario.title,
+        "facts": _facts(results),
+        "reading": reading(results),
+        "columns": _columns(),
+        "rows": [_row(results, name) for name in results.ranking],
+        "versus": results.best,
+        "figures": {key: _div(figure, f"{key}-{index}") for key, figure in figures.items()},
+        "zero_thrust": any((table["delta_v_m_s"] <= 0).any() for table in flown.episodes.values()),
+        "hidden": results.hidden,
+        "flight_seed": flown.flight_seed,
+        "flights": [_flight(results, name) for name in results.ranking],
+        "tolerance_m": flown.scenario.tolerance_m,
+        "weight": flown.scenario.reward.error_weight,
+        "details": details,
+    }
+
+
+def _facts(results: Results) -> list[str]:
+    """The scenario in a few words."""
+    scenario = results.flown.scenario
+    seconds = scenario.num_steps * scenario.dt_s
+    return [
+        f"{seconds / scenario.orbit.period_s:.3g} orbits = {seconds / 3600:.3g} h",
+        f"steps of {scenario.dt_s:g} s",
+        f"thrust up to {1e3 * scenario.spacecraft.max_accel_m_s2:g} mm/s² per axis",
+        f"sensor {scenario.sensor.sigma_pos_m:g} m, {scenario.sensor.sigma_vel_m_s:g} m/s",
+        f"tolerance {scenario.tolerance_m:g} m",
+        f"cost = Δv + {scenario.reward.error_weight:g} (m/s)/m × mean error",
+    ]
+
+
+def _columns() -> list[tuple[str, str, str]]:
+    """Metric, heading and unit of each column; a metric without an entry is shown under its own name."""
+    return [(name, *COLUMNS.get(name, (name, "", 1.0))[:2]) for name in METRICS if name != "steps"]
+
+
+def _row(results: Results, name: str) -> dict[str, Any]:
+    """A policy's line of the table."""
+    cells = []
+    for metric, _, _ in _columns():
+        factor = COLUMNS.get(metric, ("", "", 1.0))[2]
+        mean, low, high = numbers(results.interval(name, metric), factor)
+        best = metric not in _NEVER_BEST and name in results.best_of(metric)
+        cells.append({"mean": mean, "low": low, "high": high, "best": best})
+    return {"policy": name, "best": name == results.best, "cells": cells, "versus": _versus(results, name)}
+
+
+def _versus(results: Results, name: str) -> dict[str, Any] | None:
+    """The paired difference of the return to the best policy's."""
+    if name == results.best:
+        return None
+    difference = results.differences[results.best][name]["return"]
+    mean, low, high = numbers(difference)
+    return {"mean": mean, "low": low, "high": high, "significant": significant(difference)}
+
+
+def _flight(results: Results, name: str) -> dict[str, str]:
+    """What the flight shown in full came to."""
+    flight = results.flown.flights[name]
+    return {
+        "policy": name,
+        "delta_v": number(float(flight["delta_v_m_s"].sum())),
+        "final": number(float(flight["position_error_m"].iloc[-1])),
+    }
+
+
+def _div(figure: Figure, name: str) -> Markup:
+    """A figure as an HTML element with its data; plotly.js stands once in the page's head."""
+    config = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"]}
+    html = plotly.io.to_html(figure, full_html=False, include_plotlyjs=False, div_id=name, config=config)
+    return Markup(html)

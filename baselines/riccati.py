@@ -1,0 +1,117 @@
+"""Linear quadratic regulators: gains from Riccati equations.
+
+Legend: A, B and Phi, Gamma continuous and discrete model; Q, R weights; P cost-to-go; K gain of u = -K x.
+"""
+
+from typing import Final
+
+import control
+import numpy as np
+
+from formation_env.dynamics.base import Array
+
+OVERLOAD: Final = 10.0
+"""How much more a control costs in `least_fuel_gains`, per limit beyond the limit."""
+
+
+def stationary_gain(Phi: Array, Gamma: Array, Q: Array, R: Array) -> Array:
+    """Gain (3, 6) of the infinite horizon in discrete time, by python-control.
+
+    Args:
+        Phi: state transition matrix (6, 6) over the step.
+        Gamma: input matrix (6, 3).
+        Q: state weight (6, 6).
+        R: control weight (3, 3).
+    """
+    K, _, _ = control.dlqr(Phi, Gamma, Q, R)
+    return np.asarray(K)
+
+
+def continuous_gain(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
+    """Gain (3, 6) and cost-to-go (6, 6) of the infinite horizon in continuous time (Ma 2009, eq. 4.18).
+
+    Args:
+        A: state matrix (6, 6).
+        B: control matrix (6, 3).
+        Q: state weight (6, 6).
+        R: control weight (3, 3).
+    """
+    K, P, _ = control.lqr(A, B, Q, R)
+    return np.asarray(K), np.asarray(P)
+
+
+def finite_horizon_gains(Phi: Array, Gamma: Array, Q: Array, R: Array, terminal: Array) -> Array:
+    """Gains of a finite horizon: the discrete form of Ma 2009, eq. (4.12-4.14).
+
+    Args:
+        Phi: state transition matrix (6, 6).
+        Gamma: input matrix (6, 3).
+        Q: weight (6, 6) of the state at every step but the last.
+        R: control weights (steps, 3, 3), from the first step on.
+        terminal: weight (6, 6) of the last state.
+
+    Returns:
+        Gains (steps, 3, 6), from the first step on.
+    """
+    gains = np.zeros((len(R), 3, 6))
+    P = terminal
+    for step in reversed(range(len(R))):
+        PG = P @ Gamma
+        # K = (R + Gamma' P Gamma)^-1 Gamma' P Phi;  P <- Phi' P (Phi - Gamma K) + Q
+        gains[step] = np.linalg.solve(R[step] + Gamma.T @ PG, PG.T @ Phi)
+        P = Phi.T @ P @ (Phi - Gamma @ gains[step]) + Q
+        P = (P + P.T) / 2
+    return gains
+
+
+def closed_loop(Phi: Array, Gamma: Array, gains: Array, start: Array) -> tuple[Array, Array]:
+    """Follow u = -K x from a start.
+
+    Args:
+        Phi: state transition matrix (6, 6).
+        Gamma: input matrix (6, 3).
+        gains: (steps, 3, 6).
+        start: state (6,).
+
+    Returns:
+        States (steps + 1, 6) and controls (steps, 3).
+    """
+    states, controls = np.zeros((len(gains) + 1, 6)), np.zeros((len(gains), 3))
+    states[0] = start
+    for step, K in enumerate(gains):
+        controls[step] = -K @ states[step]
+        states[step + 1] = Phi @ states[step] + Gamma @ controls[step]
+    return states, controls
+
+
+def least_fuel_gains(
+    Phi: Array, Gamma: Array, R: Array, terminal: Array, start: Array, limit: float, rounds: int, floor: float
+) -> Array:
+    """Gains of a finite horizon that spend little fuel from a start on: iteratively reweighted least squares.
+
+    The sum of |u| is the limit of sums of w_k |u_k|^2 with w_k = 1 / |u_k| of the round before; it makes most of the
+    u_k vanish, so that the path is one of a few burns (Daubechies et al. 2010, doi 10.1002/cpa.20303). A control beyond
+    the limit is charged `OVERLOAD` times more, and the weights move by half of the way (in logarithm), lest they swing.
+
+    Args:
+        Phi: state transition matrix (6, 6).
+        Gamma: input matrix (6, 3).
+        R: control weights (steps, 3, 3) of the first round.
+        terminal: weight (6, 6) of the last state.
+        start: state (6,).
+        limit: greatest control of an axis, m/s^2.
+        rounds: how often the weights are renewed; 0 gives the least energy.
+        floor: added to |u_k| / limit, so that no weight is infinite; thrust in the coasts is cheaper if it is large.
+
+    Returns:
+        Gains (steps, 3, 6).
+    """
+    no_cost, weights = np.zeros((6, 6)), np.ones(len(R))
+    gains = finite_horizon_gains(Phi, Gamma, no_cost, R, terminal)
+    for _ in range(rounds):
+        _, controls = closed_loop(Phi, Gamma, gains, start)
+        overload = np.maximum(np.abs(controls).max(axis=1) / limit - 1.0, 0.0)
+        wanted = (1.0 + OVERLOAD * overload) / (np.linalg.norm(controls, axis=1) / limit + floor)
+        weights = np.sqrt(weights * wanted)
+        gains = finite_horizon_gains(Phi, Gamma, no_cost, weights[:, None, None] * R, terminal)
+    return gains

@@ -1,0 +1,56 @@
+"""Sliding mode control along the desired path."""
+
+import numpy as np
+
+from baselines.guidance import Guidance, Guide
+from baselines.policy import AccelerationPolicy, Observations
+from baselines.reaching import AnyReaching, ExponentialReaching
+from baselines.surfaces import AnySurface, PlacedSurface
+from formation_env.dynamics.base import Array
+from formation_env.scenario import Scenario
+from formation_env.settings import NonNegative, settings
+
+
+@settings
+class SMCSettings:
+    """Gains of `smc`.
+
+    Attributes:
+        guidance: the desired path of transfers, see `baselines.guidance`.
+        surface: the sliding surface s = Ce e.
+        reaching: how s comes to zero.
+        boundary_m: thickness Delta of the boundary layer, within which sgn s is replaced by s / Delta, m; 0 is none.
+    """
+
+    guidance: Guide = "least_fuel"
+    surface: AnySurface = PlacedSurface()
+    reaching: AnyReaching = ExponentialReaching()
+    boundary_m: NonNegative = 50.0
+
+
+class SMC(AccelerationPolicy):
+    """u = (Ce Gamma)^-1 (Ce x_d(k+1) - Ce Phi x(k) - s(k+1)), s = Ce (x_d - x) (Ma 2009, eq. 4.59-4.61)."""
+
+    Settings = SMCSettings
+
+    def __init__(self, scenario: Scenario, gains: SMCSettings) -> None:
+        super().__init__(scenario)
+        self.gains = gains
+        self._guidance = Guidance(scenario, gains.guidance)
+        model = scenario.filter_model()
+        self.Ce = gains.surface.Ce(model, scenario.dt_s)
+        self._Ce_Phi = self.Ce @ model.Phi
+        self._inverse = np.linalg.inv(self.Ce @ model.Gamma)
+
+    def acceleration(self, observation: Observations) -> Array:
+        """Accelerations (..., 3), m/s^2."""
+        now = self._guidance.track(observation)
+        # Ce x_d(k+1) - Ce Phi x(k) = Ce residual - Ce Phi (x - x_d): the path's own thrust, and the error's free motion
+        free = now.residual @ self.Ce.T - now.error @ self._Ce_Phi.T
+        return (free - self.next_surface(-now.error @ self.Ce.T)) @ self._inverse.T
+
+    def next_surface(self, s: Array) -> Array:
+        """Where the reaching law takes s (..., 3) in one step, m (eq. 4.56)."""
+        boundary = self.gains.boundary_m
+        sign = np.clip(s / boundary, -1.0, 1.0) if boundary > 0 else np.sign(s)
+        return s + self.gains.reaching.change(s, sign, self.scenario.dt_s)

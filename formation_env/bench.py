@@ -1,0 +1,85 @@
+"""How fast the environments step, beside Gymnasium's own in the same run, so that the ratio means something."""
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+import gymnasium
+import pandas as pd
+
+from formation_env.envs import ENV_IDS
+
+RIVALS: Final = ("CartPole-v1", "Pendulum-v1")
+_ROUNDS: Final = 7
+
+
+def single_stepper(env_id: str, steps: int) -> Callable[[], int]:
+    """A function that takes some steps in one environment made with `gymnasium.make`; it returns how many."""
+    env: gymnasium.Env[Any, Any] = gymnasium.make(env_id)
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    action = env.action_space.sample()
+
+    def run() -> int:
+        for _ in range(steps):
+            _, _, terminated, truncated, _ = env.step(action)
+            if terminated or truncated:
+                env.reset()
+        return steps
+
+    return run
+
+
+def batch_stepper(env_id: str, rows: int, steps: int) -> Callable[[], int]:
+    """The same for the batched environment; a step of all rows counts as many."""
+    env = gymnasium.make_vec(env_id, rows, vectorization_mode="vector_entry_point")
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    actions = env.action_space.sample()
+
+    def run() -> int:
+        for _ in range(steps):
+            env.step(actions)
+        return steps * rows
+
+    return run
+
+
+def rates(steppers: dict[str, Callable[[], int]], rounds: int = _ROUNDS) -> dict[str, float]:
+    """Steps per second of each, the best of some rounds in which all take turns (the clock of a machine is noisy)."""
+    best = dict.fromkeys(steppers, 0.0)
+    for run in steppers.values():
+        run()
+    for _ in range(rounds):
+        for name, run in steppers.items():
+            start = time.perf_counter()
+            steps = run()
+            best[name] = max(best[name], steps / (time.perf_counter() - start))
+    return best
+
+
+def startup() -> dict[str, float]:
+    """Seconds of a new process to import the package, and to its first reset and step (compiled code is cached)."""
+    code = (
+        "import time; a = time.perf_counter(); import formation_env; b = time.perf_counter();"
+        "e = formation_env.FormationEnv(); e.reset(seed=0); e.step([0, 0, 0]); c = time.perf_counter();"
+        "v = formation_env.FormationVectorEnv(64); v.reset(seed=0); v.step(v.action_space.sample());"
+        "print(b - a, c - b, time.perf_counter() - c)"
+    )
+    output = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    return dict(zip(("import", "first single step", "first batched step"), map(float, output.split()), strict=True))
+
+
+def table(rows: int) -> pd.DataFrame:
+    """Rates of all environments: columns steps_per_s and ratios to the rivals, for one environment and for a batch."""
+    ids = (*ENV_IDS, *RIVALS)
+    singles = rates({env_id: single_stepper(env_id, 2000) for env_id in ids})
+    batches = rates({env_id: batch_stepper(env_id, rows, 40) for env_id in (*ENV_IDS, RIVALS[0])})
+    lines = [
+        {"faces": faces, "env": env_id, "steps_per_s": rate, "x_cartpole": rate / group[RIVALS[0]]}
+        for faces, group in (("single", singles), (f"batch of {rows}", batches))
+        for env_id, rate in group.items()
+    ]
+    return pd.DataFrame(lines)

@@ -1,0 +1,171 @@
+"""The adapter between the batched environment and Stable-Baselines3."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from stable_baselines3 import PPO
+from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+
+from agents.vec_env import FormationVecEnv
+from formation_env import FormationVectorEnv, Scenario, load_scenario
+from formation_env.settings import build
+
+ROWS = 5
+
+
+def short_scenario(**changes: Any) -> Scenario:
+    """A hold of 19 steps; the rows that drift beyond 150 m end before that."""
+    phases = [{"formation": {"kind": "space_circle", "x0_m": 2000, "vx0_m_s": 0.2}, "hold_periods": 0.1}]
+    start = {"formation": phases[0]["formation"], "spread_pos_m": 50, "spread_vel_m_s": 0.05}
+    data = {"spacecraft": {"max_accel_m_s2": 0.002}, "start": start, "phases": phases}
+    return build(Scenario, data | {"limits": {"max_distance_m": 120}} | changes, "test")
+
+
+@pytest.fixture(scope="module")
+def scenario() -> Scenario:
+    return short_scenario()
+
+
+def actions(steps: int) -> np.ndarray:
+    return np.random.default_rng(1).uniform(-1, 1, (steps, ROWS, 3)).astype(np.float32)
+
+
+def test_adapter_hands_on_what_the_batched_environment_gives(scenario: Scenario) -> None:
+    """One environment, two faces: equal to the last bit, rewards up to float32, over many ends of both kinds."""
+    adapter, batch = FormationVecEnv(ROWS, scenario), FormationVectorEnv(ROWS, scenario)
+    adapter.seed(7)
+    np.testing.assert_array_equal(adapter.reset(), batch.reset(seed=7)[0])
+    kinds, returns = set(), np.zeros(ROWS)
+    for action in actions(80):
+        observations, rewards, dones, infos = adapter.step(action)
+        expected, true_rewards, terminated, truncated, batch_infos = batch.step(action)
+        np.testing.assert_array_equal(observations, expected)
+        np.testing.assert_array_equal(rewards, true_rewards.astype(np.float32))
+        np.testing.assert_array_equal(dones, terminated | truncated)
+        returns += true_rewards
+        for row in range(ROWS):
+            if not dones[row]:
+                assert infos[row] == {}
+                continue
+            kinds.add(bool(terminated[row]))
+            np.testing.assert_array_equal(infos[row]["terminal_observation"], batch_infos["final_obs"][row])
+            assert infos[row]["TimeLimit.truncated"] == (truncated[row] and not terminated[row])
+            assert infos[row]["episode"]["r"] == pytest.approx(returns[row], rel=1e-9)
+            returns[row] = 0
+    assert kinds == {True, False}, "the test must see both kinds of end"
+
+
+def test_episode_statistics_are_those_of_monitor(scenario: Scenario) -> None:
+    """SB3's own Monitor, around a single environment with the same seed, is the oracle (it rounds to 1e-6)."""
+    single = Monitor(gymnasium.make("FormationKeeping-v0", scenario=scenario))
+    adapter = FormationVecEnv(ROWS, scenario)
+    adapter.seed(20)
+    adapter.reset()
+    single.reset(seed=20)
+    ended = False
+    for action in actions(scenario.num_steps):
+        _, _, dones, infos = adapter.step(action)
+        if not ended:
+            _, _, terminated, truncated, info = single.step(action[0])
+            ended = terminated or truncated
+            assert bool(dones[0]) == ended
+            if ended:
+                assert infos[0]["episode"]["l"] == info["episode"]["l"]
+                assert infos[0]["episode"]["r"] == pytest.approx(info["episode"]["r"], abs=1e-6)
+                assert infos[0]["episode"]["t"] > 0
+    assert ended
+
+
+def test_infos_share_nothing(scenario: Scenario) -> None:
+    """A wrapper may write into a row's info; neither other rows nor later steps may see that."""
+    adapter = FormationVecEnv(ROWS, scenario)
+    adapter.reset()
+    first = adapter.step(actions(1)[0])[3]
+    first[0]["mark"] = 1
+    assert "mark" not in first[1]
+    assert "mark" not in adapter.step(actions(1)[0])[3][0]
+
+
+def test_reward_scale_is_a_factor_and_leaves_the_statistics(scenario: Scenario) -> None:
+    """What is learnt from is scaled, what is reported is in m/s."""
+    plain, scaled = FormationVecEnv(ROWS, scenario), FormationVecEnv(ROWS, scenario, reward_scale=8.0)
+    for env in (plain, scaled):
+        env.seed(3)
+        env.reset()
+    for action in actions(scenario.num_steps):
+        one, eight = plain.step(action), scaled.step(action)
+        np.testing.assert_array_equal(8 * one[1], eight[1])  # a power of two: no rounding
+        assert [info.get("episode", {}).get("r") for info in one[3]] == [
+            info.get("episode", {}).get("r") for info in eight[3]
+        ]
+
+
+def test_seeds_and_options_count_once(scenario: Scenario) -> None:
+    """As in SB3's own vectorised environments: equal seeds, equal episodes; the next reset goes on with the stream."""
+    adapter = FormationVecEnv(ROWS, scenario)
+    adapter.seed(11)
+    first, second = adapter.reset(), adapter.reset()
+    adapter.seed(11)
+    np.testing.assert_array_equal(adapter.reset(), first)
+    assert not np.array_equal(first, second)
+    start = np.array([2100.0, 0, 0, 0, 0, 0])
+    adapter.set_options({"initial_state": start})
+    adapter.reset()
+    np.testing.assert_array_equal(adapter.batch.simulation.row_state(0, 6).shape, (6,))
+    adapter.set_options([{"initial_state": start}] + [{}] * (ROWS - 1))
+    with pytest.raises(ValueError, match="initial_state must be given to all rows or to none"):
+        adapter.reset()
+
+
+def test_staggered_rows_end_at_different_times() -> None:
+    """With no early ends, rows begun evenly over an episode of N steps end evenly over N steps, and go on so."""
+    scenario = short_scenario(limits={"max_distance_m": 50e3})
+    adapter = FormationVecEnv(ROWS, scenario, stagger=True)
+    adapter.seed(5)
+    adapter.reset()
+    coast = np.zeros((ROWS, 3), np.float32)
+    ends = [np.flatnonzero(adapter.step(coast)[2]) for _ in range(2 * scenario.num_steps)]
+    steps = [step for step, rows in enumerate(ends) for _ in rows]
+    begins = np.arange(ROWS) * scenario.num_steps // ROWS
+    last = scenario.num_steps - 1
+    expected = sorted({*((begins - 1) % scenario.num_steps)}) + sorted({*((begins - 1) % scenario.num_steps + last + 1)})
+    assert steps == expected
+
+
+def test_attributes_and_methods_of_the_shared_environment(scenario: Scenario) -> None:
+    """The rows share one environment: reading is for any of them, changing only for all."""
+    adapter = FormationVecEnv(ROWS, scenario)
+    assert adapter.get_attr("scenario", [0, 2]) == [scenario] * 2
+    assert not adapter.has_attr("no_such_thing")
+    adapter.set_attr("render_mode", None)
+    assert adapter.env_method("close") == [None] * ROWS
+    assert adapter.env_is_wrapped(Monitor) == [True] * ROWS
+    assert adapter.env_is_wrapped(gymnasium.wrappers.ClipAction, [1]) == [False]
+    with pytest.raises(ValueError, match="set_attr: scenario: the rows share one environment"):
+        adapter.set_attr("scenario", None, indices=[0])
+    with pytest.raises(ValueError, match="env_method: close: the rows share one environment"):
+        adapter.env_method("close", indices=1)
+
+
+def test_stable_baselines_wrappers_and_evaluation_take_the_adapter(scenario: Scenario) -> None:
+    """VecNormalize and VecMonitor run on it, and evaluate_policy finds the statistics without a warning."""
+    env = VecNormalize(VecMonitor(FormationVecEnv(ROWS, scenario)), norm_obs=False)
+    model = PPO("MlpPolicy", env, n_steps=8, batch_size=20, n_epochs=1, seed=0, device="cpu")
+    model.learn(2 * 8 * ROWS)
+    returns, lengths = evaluate_policy(model, FormationVecEnv(3, scenario), 6, return_episode_rewards=True)
+    assert len(returns) == 6
+    assert max(lengths) <= scenario.num_steps
+
+
+def test_stable_baselines_own_vectorised_environment_works() -> None:
+    """The registered ids need no adapter."""
+    env = make_vec_env("FormationKeeping-v0", n_envs=2, seed=0)
+    model = PPO("MlpPolicy", env, n_steps=8, batch_size=16, n_epochs=1, seed=0, device="cpu").learn(32)
+    action, _ = model.predict(env.reset())
+    assert action.shape == (2, 3)
+    assert load_scenario("keeping") == env.get_attr("unwrapped")[0].scenario

@@ -1,0 +1,158 @@
+"""The architecture: which module may import which, read from the sources without running them."""
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("formation_env", "baselines", "agents")
+
+# Each package may import itself and those before it.
+# Inside formation_env each line may import itself and the lines above; a new module takes its place here.
+LAYERS = (
+    {"constants", "settings", "seeds", "jit", "fastmath", "streams", "orbit", "spacecraft"},
+    {"dynamics", "formations", "dropout", "estimation", "propagation"},
+    {"scenario", "observation", "schedule"},
+    {"kernel"},
+    {"metrics"},
+    {"envs"},
+    {"evaluation", "rendering"},
+    {"", "__main__", "bench"},
+)
+LEARNING = {"stable_baselines3", "torch", "ray", "tensorboard"}
+PLOTTING = {"matplotlib", "plotly"}
+
+
+@dataclass(frozen=True)
+class Import:
+    """One module's import of another.
+
+    Attributes:
+        source: dotted name of the importing module.
+        target: dotted name of what it imports.
+        lazy: whether it happens inside a function only.
+        line: where.
+    """
+
+    source: str
+    target: str
+    lazy: bool
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.source}:{self.line} imports {self.target}"
+
+
+def module_name(path: Path) -> str:
+    """Dotted name of a source file."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+FILES = {module_name(path): path for package in PACKAGES for path in sorted((ROOT / package).rglob("*.py"))}
+
+
+def is_for_types_only(node: ast.AST) -> bool:
+    """Whether this is `if TYPE_CHECKING:`, which never runs."""
+    return isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+
+
+def statements(tree: ast.AST, lazy: bool = False) -> Iterator[tuple[ast.Import | ast.ImportFrom, bool]]:
+    """Every import statement below a node, and whether it is inside a function."""
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield node, lazy
+        elif not is_for_types_only(node):
+            yield from statements(node, lazy or isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda))
+
+
+def targets(node: ast.Import | ast.ImportFrom) -> list[str]:
+    """The modules that a statement imports: `from package import name` is `package.name` if that is a module."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    assert node.module is not None, "imports are absolute"
+    assert node.level == 0, "imports are absolute"
+    names = [f"{node.module}.{alias.name}" for alias in node.names]
+    return [name if name in FILES else node.module for name in names]
+
+
+IMPORTS = [
+    Import(source, target, lazy, node.lineno)
+    for source, path in FILES.items()
+    for node, lazy in statements(ast.parse(path.read_text(encoding="utf-8")))
+    for target in targets(node)
+]
+
+
+def package(module: str) -> str:
+    """The first part of a dotted name."""
+    return module.split(".")[0]
+
+
+def layer(module: str) -> int:
+    """Where a module of formation_env stands."""
+    part = module.removeprefix("formation_env").lstrip(".").split(".")[0]
+    places = [index for index, members in enumerate(LAYERS) if part in members]
+    assert places, f"give {module} its place in LAYERS"
+    return places[0]
+
+
+def draws(module: str) -> bool:
+    """Whether a module is one of those that plot: rendering, or of a report."""
+    return any(part == "rendering" or part.startswith(("report", "figures")) for part in module.split("."))
+
+
+def test_the_sources_are_read() -> None:
+    """The parser sees imports at both levels, and submodules behind `from package import name`."""
+    assert {package(name) for name in FILES} == set(PACKAGES)
+    seen = {(found.source, found.target, found.lazy) for found in IMPORTS}
+    assert ("formation_env.kernel.lanes", "formation_env.estimation", False) in seen
+    assert ("formation_env.settings", "ruamel.yaml", True) in seen
+
+
+def test_packages_import_one_way() -> None:
+    """formation_env <- baselines <- agents, inside functions too."""
+    wrong = [
+        str(found)
+        for found in IMPORTS
+        if package(found.target) in PACKAGES
+        and PACKAGES.index(package(found.target)) > PACKAGES.index(package(found.source))
+    ]
+    assert wrong == []
+
+
+def test_layers_import_downwards() -> None:
+    """From ideas to use; only rendering may be fetched from below, by a function that draws."""
+    inside = [found for found in IMPORTS if {package(found.source), package(found.target)} == {"formation_env"}]
+    wrong = [
+        str(found)
+        for found in inside
+        if layer(found.target) > layer(found.source) and not (found.lazy and draws(found.target))
+    ]
+    assert wrong == []
+
+
+@pytest.mark.parametrize("owner", ["formation_env", "baselines"])
+def test_learning_libraries_stay_out(owner: str) -> None:
+    """Nobody needs an RL library to import the environments or the classical policies."""
+    wrong = [
+        str(found)
+        for found in IMPORTS
+        if package(found.source) == owner and package(found.target) in LEARNING and not found.lazy
+    ]
+    assert wrong == []
+
+
+def test_plotting_is_loaded_by_those_who_plot() -> None:
+    """matplotlib and plotly: inside functions, or in rendering and report modules, themselves loaded in functions."""
+    wrong = [
+        str(found)
+        for found in IMPORTS
+        if not found.lazy
+        and not draws(found.source)
+        and (package(found.target) in PLOTTING or (found.target in FILES and draws(found.target)))
+    ]
+    assert wrong == []
