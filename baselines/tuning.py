@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
 from baselines.policy import Actions, Observations
-from baselines.registry import POLICIES, make_policy, read_gains
+from baselines.registry import make_policy, read_gains
 from formation_env.dynamics.base import Array
 from formation_env.evaluation import Policy, evaluate
 from formation_env.scenario import Scenario, config_folder, load_scenario, scenario_names

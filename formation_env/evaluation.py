@@ -80,7 +80,7 @@ def _fly(policy: Policy, scenario: Scenario, seeds: list[int], progress: Callabl
 
 
 def bootstrap_interval(values: NDArray[np.float64], confidence: float = 0.95) -> tuple[float, float]:
-    """Confidence interval of the mean by the bias-corrected bootstrap (scipy), from the data alone (its seed is fixed)."""
+    """Confidence interval of the mean of values (n,) by the bias-corrected bootstrap; the same data give the same."""
     values = np.asarray(values, float)
     if len(values) < 2 or np.ptp(values) == 0:
         return float(values.mean()), float(values.mean())

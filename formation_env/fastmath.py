@@ -19,7 +19,7 @@ _SQRT_2: Final = 1.4142135623730951
 
 
 def _log_series() -> tuple[float, ...]:
-    """Coefficients of a polynomial for ln(1 + y) / y on [1/sqrt 2 - 1, sqrt 2 - 1], by interpolation in Chebyshev nodes."""
+    """Polynomial for ln(1 + y) / y, where 1 + y is in [1/sqrt 2, sqrt 2]: the two meet in Chebyshev's nodes."""
     domain = (1 / _SQRT_2 - 1, _SQRT_2 - 1)
     fit = np.polynomial.Chebyshev.interpolate(lambda y: np.log1p(y) / y, 12, domain)
     return tuple(float(c) for c in fit.convert(kind=np.polynomial.Polynomial).coef)

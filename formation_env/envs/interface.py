@@ -1,5 +1,6 @@
 """What the single and the batched environment have in common: spaces, info, checks."""
 
+import reprlib
 from collections.abc import Mapping
 from math import isfinite
 from typing import Any, Final, cast
@@ -90,7 +91,14 @@ def check_actions(actions: Any, num_rows: int) -> NDArray[np.float32]:
 
 
 def _numbers(values: Any, name: str) -> NDArray[np.float32]:
+    """Values as float32; never read out of strings or flags."""
     try:
-        return np.asarray(values, np.float32)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}: must be numbers, got {values!r}") from None
+        array = np.asarray(values)
+    except ValueError:  # a ragged list
+        array = np.empty(0, object)
+    if array.dtype.char == "f":
+        return array
+    if array.dtype.kind not in "fiu":
+        raise ValueError(f"{name}: must be numbers, got {reprlib.repr(values)}")
+    with np.errstate(over="ignore"):  # what is too large is infinite then, and refused as such
+        return array.astype(np.float32)

@@ -29,7 +29,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     Reward: see `formation_env.scenario.Reward`. Truncated at the end of the plan; terminated beyond a limit.
     """
 
-    metadata = {"render_modes": ["rgb_array", "human"], "render_fps": 20}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 20}  # noqa: RUF012
 
     def __init__(self, scenario: str | Path | Scenario = "keeping", render_mode: str | None = None) -> None:
         """Make the environment.

@@ -104,15 +104,18 @@ class Scene:
     def restart(self) -> None:
         """Show the whole plan again, from its first phase."""
         self._half_m = self._plan.half_m
-        self._draw_background(self._plan.legs[0])
+        self._draw_background(0)
 
-    def _draw_background(self, leg: Leg) -> None:
-        self._leg = leg
-        self._phase.set_text(f"{leg.index + 1}/{len(self._plan.legs)}: {leg.phase.formation.kind.replace('_', ' ')}")
+    def _draw_background(self, step: int) -> None:
+        leg = self._plan.leg(step)
+        self._shown = _stage(leg, step)
+        doing = "transfer to" if step < leg.arrival else "hold"
+        formation = leg.phase.formation.kind.replace("_", " ")
+        self._phase.set_text(f"{leg.index + 1}/{len(self._plan.legs)}: {doing} {formation}")
         close_up_m = CLOSE_UP_TOLERANCES * self._scenario.tolerance_m
         for view, (*_, close_up, _) in zip(self._views, _VIEWS, strict=True):
-            limits = (np.zeros(3), close_up_m) if close_up else (self._plan.centre, self._half_m)
-            view.prepare(*limits, self._plan.paths[leg.index])
+            centre, half_m = (np.zeros(3), close_up_m) if close_up else (self._plan.centre, self._half_m)
+            view.prepare(centre, half_m, self._plan.paths[leg.index])
         self._canvas.draw()
         self._background = self._canvas.copy_from_bbox(self._figure.bbox)
 
@@ -142,15 +145,16 @@ class Scene:
     def _keep_up(self, moment: Moment) -> None:
         """A new background for a new phase, and when the follower has left the views: they double."""
         distance_m = float(np.abs(moment.truth - self._plan.centre).max())
-        leg, doublings = self._plan.leg(moment.step), np.ceil(np.log2(max(distance_m / self._half_m, 1.0)))
-        if leg is not self._leg or doublings > 0:
+        doublings = np.ceil(np.log2(max(distance_m / self._half_m, 1.0)))
+        if doublings > 0 or self._shown != _stage(self._plan.leg(moment.step), moment.step):
             self._half_m *= 2.0**doublings
-            self._draw_background(leg)
+            self._draw_background(moment.step)
 
     def _values(self, moment: Moment) -> list[str]:
         """Texts of `_NUMBERS`."""
         dt_s, period_s = self._scenario.dt_s, self._scenario.orbit.period_s
-        goal = self._leg.arrival if moment.step < self._leg.arrival else self._leg.end
+        leg = self._plan.leg(moment.step)
+        goal = leg.arrival if moment.step < leg.arrival else leg.end
         sigma_m = np.sqrt(np.trace(moment.covariance) / 3)
         accel_mm_s2 = 1000 * self._scenario.spacecraft.max_accel_m_s2 * np.linalg.norm(moment.thrust)
         return [
@@ -169,3 +173,8 @@ class Scene:
         text = "LINK UP" if moment.measured else f"LINK LOST  {moment.age_s:.0f} s"
         fill, edge, color = ("white", GREY, GREY) if moment.measured else (RED, RED, "white")
         self._link.set(text=text, color=color, bbox={"fc": fill, "ec": edge, "boxstyle": "round,pad=0.4"})
+
+
+def _stage(leg: Leg, step: int) -> tuple[int, bool]:
+    """Which phase, and whether the follower is on its way."""
+    return leg.index, step < leg.arrival

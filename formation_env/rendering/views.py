@@ -50,7 +50,7 @@ class View:
         self.axes, self._pick, self._close_up = axes, [1, up], close_up
         self._unit_m = 1.0
         self._lines = {name: axes.plot([], [], **style)[0] for name, style in STYLES.items()}
-        arrow = {"scale_units": "width", "scale": 1 / FULL_THRUST, "width": 0.05 if close_up else 0.02}
+        arrow: dict[str, Any] = {"scale_units": "width", "scale": 1 / FULL_THRUST, "width": 0.05 if close_up else 0.02}
         self._arrow = axes.quiver([0], [0], [0], [0], color=GREEN, minlength=0, zorder=2.5, **arrow)
         still = () if close_up else STILL
         self.moving: list[Artist] = [line for name, line in self._lines.items() if name not in still]
