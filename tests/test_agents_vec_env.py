@@ -9,7 +9,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
-from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
+from stable_baselines3.common.vec_env import VecNormalize
 
 from agents.vec_env import FormationVecEnv
 from formation_env import FormationVectorEnv, Scenario, load_scenario
@@ -153,8 +153,8 @@ def test_attributes_and_methods_of_the_shared_environment(scenario: Scenario) ->
 
 
 def test_stable_baselines_wrappers_and_evaluation_take_the_adapter(scenario: Scenario) -> None:
-    """VecNormalize and VecMonitor run on it, and evaluate_policy finds the statistics without a warning."""
-    env = VecNormalize(VecMonitor(FormationVecEnv(ROWS, scenario)), norm_obs=False)
+    """VecNormalize runs on it, and evaluate_policy finds the statistics without a warning."""
+    env = VecNormalize(FormationVecEnv(ROWS, scenario), norm_obs=False)
     model = PPO("MlpPolicy", env, n_steps=8, batch_size=20, n_epochs=1, seed=0, device="cpu")
     model.learn(2 * 8 * ROWS)
     returns, lengths = evaluate_policy(model, FormationVecEnv(3, scenario), 6, return_episode_rewards=True)

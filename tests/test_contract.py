@@ -144,7 +144,7 @@ def test_no_element_of_the_observation_is_constant(extremes: dict[str, Any]) -> 
     seen = np.concatenate([obs[:2] for _, results in extremes.values() for obs, *_ in results])
     assert seen.shape[1] == SIZE
     assert (np.ptp(seen, axis=0) > 0.1).all()
-    assert (np.abs(seen).mean(axis=0) < 10).all()
+    assert (np.abs(seen).mean(axis=0) < 5).all()
 
 
 @pytest.mark.parametrize("name", COARSE)
@@ -204,7 +204,6 @@ BAD_ACTIONS: list[Any] = [
     None,
     "forward",
     ["0", "1", "0"],
-    [True, False, True],
     [0, [0, 1], 0],
     {"thrust": 1},
     [1j, 0, 0],

@@ -36,8 +36,7 @@ def time_figure(results: Results, looks: Looks) -> go.Figure:
     figure.update_layout(style.base_layout(620), hovermode="x")
     figure.update_layout(legend={"orientation": "h", "x": 0, "y": -0.12, "yanchor": "top"})
     for row, title in enumerate(ROWS, start=1):
-        figure.update_yaxes(style.axis(title, log=row == 1), row=row, col=1)
-    figure.update_yaxes(rangemode="tozero", row=2, col=1)
+        figure.update_yaxes(style.axis(title, log=row < 3), row=row, col=1)
     figure.update_yaxes(rangemode="tozero", row=3, col=1)
     end = scenario.num_steps * scenario.dt_s / period_s
     figure.update_xaxes(gridcolor=style.GRID, zeroline=False, range=[0, end])

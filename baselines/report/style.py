@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 NEUTRAL: Final = "#868b94"
 """Grey that reads on light and on dark."""
@@ -59,13 +58,6 @@ def looks(policies: Iterable[str]) -> dict[str, Look]:
 def thinned(length: int) -> np.ndarray:
     """Indices of at most MAX_POINTS of a sequence, evenly spaced, its ends included."""
     return np.unique(np.linspace(0, length - 1, min(length, MAX_POINTS)).round().astype(int))
-
-
-def needs_log(values: ArrayLike) -> bool:
-    """Whether positive values span more than a linear axis shows."""
-    array = np.asarray(values, float)
-    array = array[array > 0]
-    return bool(array.size and array.max() > 20 * array.min())
 
 
 def axis(title: str, log: bool = False) -> dict[str, Any]:

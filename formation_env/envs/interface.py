@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from formation_env import observation
 from formation_env.dynamics.base import Array
 from formation_env.kernel import tile as f
-from formation_env.scenario import Limits
+from formation_env.kernel.simulation import Simulation
 
 INFO_STATES: Final = {"true_state": (f.TRUTH, 6), "estimate": (f.ESTIMATE, 6)}
 """Info key: first state field, size."""
@@ -42,12 +42,13 @@ def observation_space() -> spaces.Space[NDArray[np.float32]]:
     return cast(_Float32Space, spaces.Box(-observation.BOUND, observation.BOUND, (observation.SIZE,), np.float32))
 
 
-def read_start(options: Mapping[str, Any] | None, num_rows: int, limits: Limits) -> Array | None:
+def read_start(options: Mapping[str, Any] | None, simulation: Simulation) -> Array | None:
     """The start given in reset's options, as (num_rows, 6), or None.
 
     Raises:
         ValueError: an unknown option, or a start of wrong shape, not finite, or beyond the limits.
     """
+    num_rows, limits = simulation.num_rows, simulation.scenario.limits
     unknown = set(options or {}) - {START_OPTION, "reset_mask"}
     if unknown:
         raise ValueError(f"reset options: unknown {sorted(unknown)}; known: {START_OPTION}")
@@ -58,8 +59,13 @@ def read_start(options: Mapping[str, Any] | None, num_rows: int, limits: Limits)
         raise ValueError(f"{START_OPTION}: shape must be (6,) or ({num_rows}, 6), got {given.shape}")
     if not np.isfinite(given).all():
         raise ValueError(f"{START_OPTION}: must be finite, got {given}")
-    if (np.linalg.norm(given[..., :3], axis=-1) < limits.keep_out_m).any():
+    position, speed = given[..., :3], np.linalg.norm(given[..., 3:], axis=-1)
+    if (np.linalg.norm(position, axis=-1) < limits.keep_out_m).any():
         raise ValueError(f"{START_OPTION}: inside the keep-out sphere of {limits.keep_out_m:g} m: {given}")
+    if (np.linalg.norm(position - simulation.first_reference_m, axis=-1) > limits.max_distance_m).any():
+        raise ValueError(f"{START_OPTION}: farther than {limits.max_distance_m:g} m from the reference: {given}")
+    if (speed > simulation.scenario.orbit.speed_m_s).any():
+        raise ValueError(f"{START_OPTION}: faster than the orbit itself: {given}")
     return np.broadcast_to(given, (num_rows, 6))
 
 

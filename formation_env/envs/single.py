@@ -64,7 +64,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         Raises:
             ValueError: wrong options.
         """
-        starts = interface.read_start(options, 1, self.scenario.limits)
+        starts = interface.read_start(options, self.simulation)
         super().reset(seed=seed)
         if seed is not None or not self._keyed:
             self.simulation.seed(0, self.np_random)

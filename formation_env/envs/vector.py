@@ -72,7 +72,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         Raises:
             ValueError: wrong options or number of seeds.
         """
-        starts = interface.read_start(options, self.num_envs, self.scenario.limits)
+        starts = interface.read_start(options, self.simulation)
         chosen = self._mask(options)
         self._seed(seed, chosen)
         observations = self.simulation.new_observations()
@@ -148,7 +148,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         infos: dict[str, Any] = {
             name: simulation.state(field, size) for name, (field, size) in interface.INFO_STATES.items()
         }
-        infos[interface.INFO_THRUST] = simulation.results[:3, : self.num_envs].T.copy()
+        infos[interface.INFO_THRUST] = simulation.result_vector(f.THRUST, 3)
         for name, (field, kind) in interface.INFO_SCALARS.items():
             infos[name] = simulation.result(field).astype(kind)
         return infos | {f"_{name}": np.ones(self.num_envs, bool) for name in infos}

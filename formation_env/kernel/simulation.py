@@ -9,7 +9,7 @@ from formation_env.jit import LANES
 from formation_env.kernel import packing, program
 from formation_env.kernel import tile as f
 from formation_env.scenario import Scenario
-from formation_env.schedule import build_schedule
+from formation_env.schedule import OFFSETS, build_schedule
 from formation_env.streams import stream_key
 
 
@@ -95,6 +95,17 @@ class Simulation:
     def result(self, field: int) -> Array:
         """View (num_rows,) of one result of the last step."""
         return self.results[(field - f.RESULTS) // LANES, : self.num_rows]
+
+    def result_vector(self, field: int, size: int) -> Array:
+        """Copy (num_rows, size) of consecutive results of the last step."""
+        first = (field - f.RESULTS) // LANES
+        return self.results[first : first + size, : self.num_rows].T.copy()
+
+    @property
+    def first_reference_m(self) -> Array:
+        """Reference position (3,) at the start, m."""
+        first = OFFSETS["scored_position"]
+        return self.schedule[0, first : first + 3]
 
     def state(self, field: int, size: int) -> Array:
         """Copy (num_rows, size) of consecutive state fields."""

@@ -30,22 +30,22 @@ TITLE_CHARACTERS: Final = 80
 
 # Place of each view, px from the lower left: left, bottom, size; what points upward; whether it is a close-up; title.
 _VIEWS: Final = (
-    (58, 86, 330, 0, False, "Orbit plane, from the side"),
+    (62, 86, 330, 0, False, "Orbit plane, from the side"),
     (440, 86, 330, 2, False, "Local horizontal, from above"),
-    (828, 286, 116, 0, True, "Close-up"),
+    (828, 286, 116, 0, True, "Follower, close up"),
     (828, 106, 116, 2, True, ""),
 )
 # Place of each number, px from the left, and its heading.
 _NUMBERS: Final = (
     (18, "time"),
-    (112, "orbits"),
-    (382, "time left"),
-    (476, "position error"),
-    (588, "filter 1σ"),
-    (674, "thrust"),
-    (776, "Δv used"),
+    (96, "orbits"),
+    (430, "time left"),
+    (514, "position error"),
+    (616, "filter 1σ"),
+    (698, "thrust"),
+    (808, "Δv used"),
 )
-_PHASE_LEFT_PX: Final = 176
+_PHASE_LEFT_PX: Final = 152
 
 
 class Scene:
@@ -62,7 +62,7 @@ class Scene:
         self._views = [View(self._axes(*place), up, close_up) for *place, up, close_up, _ in _VIEWS]
         self._numbers = [self._number(left, heading) for left, heading in _NUMBERS]
         self._phase = self._number(_PHASE_LEFT_PX, "phase")
-        self._link = self._text(WIDTH_PX - 18, 518, 11, ha="right", weight="bold")
+        self._link = self._text(WIDTH_PX - 90, 439, 10.5, ha="center", weight="bold")
         self._border = Rectangle((0, 0), 1, 1, transform=self._figure.transFigure, fill=False, ec=RED, lw=8)
         self._figure.add_artist(self._border)
         self._moving: list[Artist] = [artist for view in self._views for artist in view.moving]

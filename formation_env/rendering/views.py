@@ -12,7 +12,7 @@ from formation_env.rendering.moment import Moment
 
 SIGMAS: Final = 3.0
 """Size of the drawn ellipse, in standard deviations."""
-FULL_THRUST: Final = 0.25
+FULL_THRUST: Final = 0.2
 """Length of the arrow of full thrust, in widths of its view; the length goes with the square root of the thrust."""
 NAMES: Final = ("radial x", "along-track y", "cross-track z")
 
@@ -50,11 +50,15 @@ class View:
         self.axes, self._pick, self._close_up = axes, [1, up], close_up
         self._unit_m = 1.0
         self._lines = {name: axes.plot([], [], **style)[0] for name, style in STYLES.items()}
-        arrow: dict[str, Any] = {"scale_units": "width", "scale": 1 / FULL_THRUST, "width": 0.05 if close_up else 0.02}
+        arrow: dict[str, Any] = {
+            "scale_units": "width",
+            "scale": 1 / FULL_THRUST,
+            "width": 0.036 if close_up else 0.015,
+        }
         self._arrow = axes.quiver([0], [0], [0], [0], color=GREEN, minlength=0, zorder=2.5, **arrow)
         still = () if close_up else STILL
-        self.moving: list[Artist] = [line for name, line in self._lines.items() if name not in still]
-        self.moving.append(self._arrow)
+        lines = [line for name, line in self._lines.items() if name not in still]
+        self.moving: list[Artist] = [self._arrow, *lines]
         if close_up:
             for name in ("reference", "follower", "estimate"):
                 self._lines[name].set_markersize(5)
@@ -71,7 +75,7 @@ class View:
             half_m: half the width, m.
             path: the reference's positions (points, 3), m.
         """
-        kilometres = half_m >= 2000
+        kilometres = half_m >= 1000
         self._unit_m = 1000.0 if kilometres else 1.0
         middle, half = centre[self._pick] / self._unit_m, half_m / self._unit_m
         self.axes.set(xlim=(middle[0] - half, middle[0] + half), ylim=(middle[1] - half, middle[1] + half))

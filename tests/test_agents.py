@@ -1,0 +1,300 @@
+"""Hyperparameters, training runs, saved models and the command line."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from typer.testing import CliRunner
+
+from agents import load_policy
+from agents.__main__ import INTERRUPTED, MISTAKE, app
+from agents.files import replacing
+from agents.plan import plan_run
+from agents.report import learned, parse_models
+from agents.runs import CURVE, LAST_MODEL, MODEL, RUN, Run, load_run, save_model, start_run
+from agents.settings import PPOSettings, SACSettings, load_settings
+from agents.train import train, training_seeds
+from agents.validation import Validation, validate
+from formation_env import ConfigError, FormationEnv, Scenario
+from formation_env.evaluation import evaluate
+from formation_env.seeds import seeds
+
+SCENARIO = """
+spacecraft: {max_accel_m_s2: 0.002}
+start: {formation: {kind: space_circle, x0_m: 2000, vx0_m_s: 0.2}, spread_pos_m: 50, spread_vel_m_s: 0.05}
+phases:
+  - {formation: {kind: space_circle, x0_m: 2000, vx0_m_s: 0.2}, hold_periods: 0.1}
+"""
+SMALL = {
+    "ppo": "{rows: 8, rollout_steps: 16, batch_size: 64, epochs: 1, network: {hidden: [8]}}",
+    "sac": "{rows: 8, gradient_steps: 1, batch_size: 16, buffer_size: 500, learning_starts: 64, network: {hidden: [8]}}",
+}
+
+
+def small_run(folder: Path, algorithm: str, **changes: Any) -> Run:
+    """A run of a second on a scenario of 19 steps."""
+    (folder / "scenario.yaml").write_text(SCENARIO)
+    (folder / "agent.yaml").write_text(SMALL[algorithm])
+    given = {"steps": 512, "validations": 2, "validation_episodes": 4, "config": folder / "agent.yaml"}
+    return plan_run(algorithm, str(folder / "scenario.yaml"), **(given | changes))
+
+
+@pytest.fixture(scope="module", params=["ppo", "sac"])
+def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Run, Path]:
+    """A short training of each algorithm."""
+    folder = tmp_path_factory.mktemp(request.param)
+    run = small_run(folder, request.param)
+    assert train(run, folder / "run")
+    return run, folder / "run"
+
+
+def test_a_run_leaves_models_settings_curve_and_tensorboard(finished: tuple[Run, Path]) -> None:
+    """The contract of a run's folder; no temporary files stay."""
+    run, folder = finished
+    assert sorted(path.name for path in folder.iterdir()) == sorted([MODEL, LAST_MODEL, RUN, CURVE, "tensorboard"])
+    assert list((folder / "tensorboard").glob("events.out.tfevents.*"))
+    assert load_run(folder) == run
+    curve = pd.read_csv(folder / CURVE)
+    assert list(curve["steps"]) == [0, 256, 512]
+    assert (curve["return_low"] <= curve["return"]).all()
+    assert (curve["return"] <= curve["return_high"]).all()
+
+
+def test_the_curve_is_of_the_validation_seeds(finished: tuple[Run, Path]) -> None:
+    """Flown again on these seeds, the last model gives the curve's last line, which has six digits."""
+    run, folder = finished
+    table = evaluate(load_policy(folder, LAST_MODEL), run.scenario, seeds("validation", 4))
+    last = pd.read_csv(folder / CURVE).iloc[-1]
+    assert table["return"].mean() == pytest.approx(last["return"], rel=1e-5)
+    assert table["delta_v_m_s"].mean() == pytest.approx(last["delta_v_m_s"], rel=1e-5)
+    best = evaluate(load_policy(folder), run.scenario, seeds("validation", 4))["return"].mean()
+    assert best == pytest.approx(pd.read_csv(folder / CURVE)["return"].max(), rel=1e-5)
+
+
+def test_training_flies_training_seeds_only() -> None:
+    """Nothing is learnt on seeds that judge; each run's seed has episodes of its own, as far as they reach."""
+    split = seeds("training", 1_000_000)
+    assert training_seeds(0, 128) == split[:128]
+    assert training_seeds(3, 128) == split[384:512]
+    with pytest.raises(ConfigError, match="seed: no training seeds are left for 128 rows, got 7812"):
+        training_seeds(7812, 128)
+
+
+def test_equal_seeds_train_equal_models(tmp_path: Path) -> None:
+    """With one thread, the same run gives the same network, bit for bit; another seed gives another."""
+    tables = []
+    for name, seed in (("a", 0), ("b", 0), ("c", 1)):
+        train(small_run(tmp_path, "ppo", seed=seed), tmp_path / name)
+        tables.append(pd.read_csv(tmp_path / name / CURVE).drop(columns="seconds"))
+    pd.testing.assert_frame_equal(tables[0], tables[1], check_exact=True)
+    assert not tables[0].equals(tables[2])
+
+
+def test_saved_and_loaded_predictions_are_identical(tmp_path: Path) -> None:
+    """A saved network is the same numbers."""
+    from agents.models import make_model
+    from agents.vec_env import FormationVecEnv
+
+    run = small_run(tmp_path, "ppo")
+    start_run(run, tmp_path / "run")
+    env = FormationVecEnv(run.agent.rows, run.scenario)
+    model = make_model(run.agent, env, seed=0)
+    save_model(model, tmp_path / "run" / MODEL)
+    observations = env.reset()
+    expected, _ = model.predict(observations, deterministic=True)
+    np.testing.assert_array_equal(load_policy(tmp_path / "run").predict(observations)[0], expected)
+
+
+def test_a_loaded_policy_flies_one_environment_or_many(finished: tuple[Run, Path]) -> None:
+    """One observation and a batch give the same actions, but for the rounding of float32 sums of other order."""
+    run, folder = finished
+    policy = load_policy(folder)
+    env = FormationEnv(scenario=run.scenario)
+    observations = np.stack([env.reset(seed=seed)[0] for seed in range(5)])
+    batch, state = policy.predict(observations, state="mine")
+    assert batch.shape == (5, 3)
+    assert state == "mine"
+    for observation, action in zip(observations, batch, strict=True):
+        single, _ = policy.predict(observation)
+        assert env.action_space.contains(single)
+        np.testing.assert_allclose(single, action, rtol=0, atol=1e-5)
+
+
+def test_interrupted_saving_leaves_the_old_model(tmp_path: Path) -> None:
+    """Whatever breaks a save, the old file stays whole and no temporary is left."""
+
+    class Breaks:
+        def save(self, path: Path) -> None:
+            path.write_bytes(b"half a mod")
+            raise KeyboardInterrupt
+
+    path = tmp_path / MODEL
+    path.write_bytes(b"the old model")
+    with pytest.raises(KeyboardInterrupt):
+        save_model(Breaks(), path)
+    assert path.read_bytes() == b"the old model"
+    assert list(tmp_path.iterdir()) == [path]
+    with replacing(path) as temporary:
+        temporary.write_bytes(b"the new model")
+    assert path.read_bytes() == b"the new model"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_ctrl_c_saves_and_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An interrupt in mid-training leaves a model that flies; the command says so and exits like an interrupted one."""
+
+    def interrupt(self: Validation) -> bool:
+        if self.num_timesteps >= 300:
+            raise KeyboardInterrupt
+        return True
+
+    monkeypatch.setattr(Validation, "_on_step", interrupt)
+    small_run(tmp_path, "ppo")
+    options = ["--steps", "512", "--out", str(tmp_path / "run"), "--config", str(tmp_path / "agent.yaml")]
+    result = CliRunner().invoke(app, ["train", "ppo", str(tmp_path / "scenario.yaml"), *options])
+    assert result.exit_code == INTERRUPTED
+    assert "interrupted" in result.stderr
+    assert load_policy(tmp_path / "run", LAST_MODEL).predict(np.zeros(38, np.float32))[0].shape == (3,)
+    again = CliRunner().invoke(app, ["train", "ppo", str(tmp_path / "scenario.yaml"), *options])
+    assert again.exit_code == MISTAKE
+    assert f"error: {tmp_path / 'run'}: holds a run already" in again.stderr
+
+
+def test_shipped_hyperparameters_load_for_every_algorithm() -> None:
+    """The shipped files are valid, and each gives its own class."""
+    assert isinstance(load_settings("ppo", "keeping"), PPOSettings)
+    assert isinstance(load_settings("sac", "mission"), SACSettings)
+
+
+def test_a_scenario_may_have_hyperparameters_of_its_own(tmp_path: Path) -> None:
+    """An override counts for its scenario alone."""
+    path = tmp_path / "ppo.yaml"
+    path.write_text("gamma: 0.9\nscenarios: {mission: {gamma: 0.999}}")
+    assert load_settings("ppo", "mission", path) == PPOSettings(gamma=0.999)
+    assert load_settings("ppo", "keeping", path) == PPOSettings(gamma=0.9)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("gama: 0.9", "gama: unknown key; did you mean 'gamma'?"),
+        ("gamma: '1e-3'", "gamma: must be a valid number, got the string '1e-3'"),
+        ("gamma: 1.5", "gamma: must be less than or equal to 1, got 1.5"),
+        ("rows: 0", "rows: must be greater than or equal to 1, got 0"),
+        ("rows: 2.5", "rows: must be a valid integer, got 2.5"),
+        ("network: {hidden: []}", "network.hidden:"),
+        ("network: {activation: gelu}", "network.activation:"),
+        ("batch_size: 1000", "batch_size: must divide rows * rollout_steps"),
+        ("[1, 2]", "(top level): must be a mapping"),
+        ("scenarios: {keping: {}}", "scenarios.keping: no such scenario; did you mean 'keeping'?"),
+        ("scenarios: {keeping: {gama: 1}}", "scenarios.keeping: gama: unknown key"),
+        ("scenarios: {keeping: 3}", "scenarios.keeping: must be a mapping"),
+        ("scenarios: 3", "scenarios: must be a mapping"),
+    ],
+)
+def test_faulty_hyperparameters_are_one_line_with_file_and_key(tmp_path: Path, text: str, fault: str) -> None:
+    """House rule: errors at the border, plain and located."""
+    path = tmp_path / "ppo.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as error:
+        load_settings("ppo", "keeping", path)
+    assert str(error.value).startswith(f"{path}: {fault}")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (["pqo", "FormationKeeping-v0"], "no algorithm named 'pqo'; did you mean 'ppo'?"),
+        (["ppo", "FormationKeping-v0"], "no environment named 'FormationKeping-v0'; did you mean"),
+        (["ppo", "keping"], "no scenario named 'keping'; did you mean 'keeping'?"),
+        (["ppo", "keeping", "--rows", "7"], "--rows: batch_size: must divide rows * rollout_steps"),
+        (["ppo", "keeping", "--config", "missing.yaml"], "missing.yaml: cannot be read"),
+        (["ppo", "keeping", "--seed", "999999"], "seed: no training seeds are left"),
+    ],
+)
+def test_mistakes_on_the_command_line_are_one_line(tmp_path: Path, arguments: list[str], fault: str) -> None:
+    """No traceback, and nothing is left on the disk."""
+    result = CliRunner().invoke(app, ["train", *arguments, "--steps", "100", "--out", str(tmp_path / "run")])
+    assert result.exit_code == MISTAKE
+    assert result.stderr.startswith("error: ")
+    assert fault in result.stderr
+    assert result.stderr.count("\n") == 1
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_folder_without_run_or_model_is_one_line(tmp_path: Path) -> None:
+    """What is missing or damaged is named."""
+    with pytest.raises(ConfigError, match="settings.json: cannot be read: No such file"):
+        load_policy(tmp_path)
+    start_run(small_run(tmp_path, "ppo"), tmp_path)
+    with pytest.raises(ConfigError, match="model.zip: no such file"):
+        load_policy(tmp_path)
+    (tmp_path / MODEL).write_text("no model")
+    with pytest.raises(ConfigError, match="model.zip: damaged"):
+        load_policy(tmp_path)
+    data = json.loads((tmp_path / RUN).read_text())
+    data["agent"]["gamma"] = 2
+    (tmp_path / RUN).write_text(json.dumps(data))
+    with pytest.raises(ConfigError, match=r"settings.json: agent: gamma: must be less than or equal to 1, got 2"):
+        load_policy(tmp_path)
+
+
+def test_the_report_flies_a_model_on_its_own_scenario_only(finished: tuple[Run, Path]) -> None:
+    """An observation is scaled by its scenario, so a model means nothing on another."""
+    run, folder = finished
+    policy = load_policy(folder)
+    factory = learned("mine", [policy])
+    assert factory(Scenario(**vars(run.scenario))) is policy
+    assert factory(Scenario(**{**vars(run.scenario), "process_noise_m_s2": 0.0})) is None
+    with pytest.raises(ConfigError, match="mine: two runs were trained on the same scenario"):
+        learned("mine", [policy, load_policy(folder)])
+
+
+def test_models_of_the_report_are_label_and_folder() -> None:
+    """A label may have several runs; it may not hide a classical policy."""
+    assert parse_models(["a=x", "b=y", "a=z=1"]) == {"a": [Path("x"), Path("z=1")], "b": [Path("y")]}
+    for wrong in ("runs/ppo", "=x", "a="):
+        with pytest.raises(ConfigError, match="must be LABEL=FOLDER"):
+            parse_models([wrong])
+    with pytest.raises(ConfigError, match="'zero' is the name of a classical policy"):
+        parse_models(["zero=x"])
+
+
+def test_the_curve_is_drawn_and_names_what_is_missing(finished: tuple[Run, Path], tmp_path: Path) -> None:
+    """A picture in the format of its ending; an unknown ending, or no run, is one line."""
+    _, folder = finished
+    picture = tmp_path / "new" / "curve.png"
+    result = CliRunner().invoke(app, ["curve", str(folder), "--out", str(picture), "--baseline", "zero"])
+    assert result.exit_code == 0, result.output
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert [path.name for path in picture.parent.iterdir()] == ["curve.png"]
+    for arguments in ([str(folder), "--out", "curve.txt"], [str(tmp_path), "--out", str(picture)]):
+        result = CliRunner().invoke(app, ["curve", *arguments])
+        assert result.exit_code == MISTAKE
+        assert result.stderr.count("\n") == 1
+
+
+def test_validation_is_of_the_mean_and_its_interval(tmp_path: Path) -> None:
+    """A policy that coasts spends nothing and costs what its error costs: 0.01 m/s per m of mean error."""
+
+    class Coast:
+        def predict(self, observation: Any, **_: Any) -> tuple[Any, Any]:
+            return np.zeros((len(observation), 3)), None
+
+    line = validate(Coast(), small_run(tmp_path, "ppo").scenario, 8)
+    assert line["delta_v_m_s"] == 0
+    assert line["return"] == pytest.approx(-0.01 * line["position_error_mean_m"], rel=1e-12)
+    assert line["return_low"] < line["return"] < line["return_high"]
+
+
+def test_settings_survive_json(tmp_path: Path) -> None:
+    """What a model is saved with is read back equal, scenario and hyperparameters alike."""
+    run = plan_run("sac", "FormationMission-v0", steps=1000, rows=4)
+    start_run(run, tmp_path)
+    assert load_run(tmp_path) == run
+    assert asdict(load_run(tmp_path).agent)["rows"] == 4

@@ -1,0 +1,127 @@
+"""Sliding mode control with perfect knowledge: how it reaches its surface, and how it moves on it."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from baselines import make_policy
+from baselines.surfaces import PlacedSurface
+from formation_env import FormationVectorEnv, load_scenario
+from formation_env.dropout import NoDropout
+from formation_env.dynamics.base import Array
+from formation_env.estimation import Sensor
+from formation_env.scenario import Scenario, Start
+from formation_env.spacecraft import Spacecraft
+
+DT_S = 2.0
+CE = np.hstack([np.diag([1.0, 0.8, 1.2]), np.diag([500.0, 600.0, 400.0])])
+SURFACE = {"kind": "given", "position": [1.0, 0.8, 1.2], "velocity_s": [500.0, 600.0, 400.0]}
+START_ERROR = np.array([60.0, -40.0, 30.0, 0.04, 0.02, -0.03])
+
+
+@pytest.fixture(scope="module")
+def perfect() -> Scenario:
+    """Keeping with perfect measurements, no noise, force-free HCW truth, and thrust to spare."""
+    keeping = load_scenario("keeping")
+    return dataclasses.replace(
+        keeping,
+        dynamics="hcw",
+        dt_s=DT_S,
+        process_noise_m_s2=0.0,
+        sensor=Sensor(sigma_pos_m=0.0, sigma_vel_m_s=0.0),
+        dropout=NoDropout(),
+        spacecraft=Spacecraft(max_accel_m_s2=1.0),
+        start=Start(formation=keeping.start.formation, spread_pos_m=1.0, spread_vel_m_s=1e-3),
+    )
+
+
+def fly(scenario: Scenario, gains: dict[str, Any], steps: int) -> Array:
+    """True errors x_d - x (steps + 1, 6) from START_ERROR on."""
+    policy, env = make_policy("smc", scenario, gains), FormationVectorEnv(1, scenario)
+    reference = scenario.phases[0].formation.reference(DT_S * np.arange(steps + 1), scenario.orbit)
+    observation, info = env.reset(seed=0, options={"initial_state": reference[0] - START_ERROR})
+    states = [info["true_state"][0]]
+    for _ in range(steps):
+        observation, _, _, _, info = env.step(policy.predict(observation)[0])
+        states.append(info["true_state"][0])
+    return reference - np.array(states)
+
+
+# Law; time to the surface from s = s_0 in continuous time; the law's rate of s.
+LAWS = {
+    "constant": ({"eps_m_s": 0.1}, lambda s: s / 0.1, lambda s: 0.1),
+    "exponential": (
+        {"eps_m_s": 0.05, "q_per_s": 0.002},
+        lambda s: np.log(1 + 0.002 * s / 0.05) / 0.002,
+        lambda s: 0.05 + 0.002 * s,
+    ),
+    "power": ({"k_m_s": 0.02, "alpha": 0.5}, lambda s: 2 * np.sqrt(s) / 0.02, lambda s: 0.02 * np.sqrt(s)),
+}
+
+
+@pytest.mark.parametrize("kind", LAWS)
+def test_surface_is_reached_when_the_law_says(perfect: Scenario, kind: str) -> None:
+    """Time to the surface by integrating Ma 2009, eq. (4.53-4.55); then s stays within one step's chatter.
+
+    The discrete law steps along the continuous one's tangent, which costs a share dt s'' / s' of the time: 1 %.
+    """
+    gains, time_s, rate = LAWS[kind]
+    steps = 900
+    errors = fly(perfect, {"surface": SURFACE, "reaching": {"kind": kind, **gains}, "boundary_m": 0.0}, steps)
+    s = errors @ CE.T
+    for axis in range(3):
+        start = abs(s[0, axis])
+        reached = DT_S * int(np.argmax(s[:, axis] * np.sign(s[0, axis]) <= 0))
+        assert 0 < reached < 0.9 * DT_S * steps
+        assert reached == pytest.approx(time_s(start), rel=0.01, abs=2 * DT_S)
+        after = np.abs(s[int(reached / DT_S) + 1 :, axis])
+        chatter = DT_S * rate(DT_S * rate(0.01)) + 0.01
+        assert after.max() <= chatter
+
+
+@pytest.mark.parametrize("boundary_m", [0.0, 20.0])
+def test_surface_follows_the_discrete_law(perfect: Scenario, boundary_m: float) -> None:
+    """s(k+1) = (I - q T) s(k) - eps T sgn s(k) (Ma 2009, eq. 4.56), with sat for sgn in the boundary layer.
+
+    The actions and observations are single precision: 1e-7 of the thrust and of the kilometres in the reference.
+    """
+    eps, q = 0.03, 0.004
+    reaching = {"kind": "exponential", "eps_m_s": eps, "q_per_s": q}
+    s = fly(perfect, {"surface": SURFACE, "reaching": reaching, "boundary_m": boundary_m}, 200) @ CE.T
+    expected = np.empty_like(s)
+    expected[0] = CE @ START_ERROR
+    for k in range(200):
+        for axis in range(3):
+            now = expected[k, axis]
+            sign = np.sign(now) if boundary_m == 0 else min(max(now / boundary_m, -1.0), 1.0)
+            expected[k + 1, axis] = now - q * DT_S * now - eps * DT_S * sign
+    near = np.abs(expected) > 2 * eps * DT_S  # beyond, chattering depends on the last digit
+    near |= boundary_m > 0
+    np.testing.assert_allclose(np.where(near, s, 0), np.where(near, expected, 0), atol=1e-3)
+
+
+def test_placed_surface_has_the_eigenvalues_asked_for(perfect: Scenario) -> None:
+    """On the surface, x(k+1) = (I - G (Ce G)^-1 Ce) Phi x: three zeros, and exp(-decay dt) (Ma 2009, eq. 4.48)."""
+    decay = (1e-3, 2e-3, 5e-4)
+    for scenario in (perfect, dataclasses.replace(perfect, dynamics="modified_hcw", dt_s=30.0)):
+        model = scenario.filter_model()
+        Ce = PlacedSurface(decay_per_s=decay).Ce(model, scenario.dt_s)
+        sliding = model.Phi - model.Gamma @ np.linalg.solve(Ce @ model.Gamma, Ce @ model.Phi)
+        expected = np.sort([0, 0, 0, *np.exp(-np.array(decay) * scenario.dt_s)])
+        np.testing.assert_allclose(np.sort(np.linalg.eigvals(sliding).real), expected, atol=1e-6)
+
+
+def test_placed_surface_slides_at_the_rate_asked_for(perfect: Scenario) -> None:
+    """After the surface is reached, each axis' error decays by its own rate alone; 1 % for what is left of s."""
+    decay = np.array([1e-3, 2e-3, 1.5e-3])
+    gains = {
+        "surface": {"kind": "placed", "decay_per_s": decay.tolist()},
+        "reaching": {"kind": "exponential", "eps_m_s": 0.05, "q_per_s": 0.05},
+        "boundary_m": 1.0,
+    }
+    errors = fly(perfect, gains, 400)
+    first, last = 150, 400
+    rates = -np.log(errors[last, :3] / errors[first, :3]) / (DT_S * (last - first))
+    np.testing.assert_allclose(rates, decay, rtol=0.01)
