@@ -9,7 +9,6 @@ from typing import Annotated
 
 import typer
 
-from formation_env.envs import ENV_IDS
 from formation_env.settings import ConfigError
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -56,9 +55,7 @@ def train(
         from agents.plan import plan_run
         from agents.train import train as train_run
 
-        run = plan_run(
-            algorithm, env, steps, seed, rows, config, validations, validation_episodes, threads, _command()
-        )
+        run = plan_run(algorithm, env, steps, seed, rows, config, validations, validation_episodes, threads, _command())
         if not train_run(run, out):
             typer.echo(f"interrupted; what was learnt up to now is in {out}", err=True)
             raise typer.Exit(INTERRUPTED)
@@ -82,7 +79,7 @@ def curve(
 @app.command()
 def report(
     model: Annotated[list[str], typer.Option(help="LABEL=FOLDER of a run; a label may have a run per scenario.")],
-    env: Annotated[list[str] | None, typer.Option(help="Environments; else those that the models were trained on.")] = None,
+    env: Annotated[list[str] | None, typer.Option(help="Environments; else those of the models.")] = None,
     episodes: Annotated[int, typer.Option(min=1, help="Test episodes per environment.")] = 100,
     out: Annotated[Path, typer.Option(help="Folder of the report.")] = Path("reports"),
 ) -> None:

@@ -1,19 +1,28 @@
 """Hyperparameters of the learning algorithms, and their YAML files.
 
-Observations are already of order 1 and are learnt from as they are. Rewards are in m/s and small; they are multiplied by
-one constant, `reward_scale`, so that values are of order 1: unlike running statistics, a constant cannot drift, and a
-saved model needs nothing beside it.
+Observations are already of order 1 and are learnt from as they are. Rewards are in m/s and small; they are multiplied
+by one constant, `reward_scale`, so that values are of order 1: unlike running statistics, a constant cannot drift, and
+a saved model needs nothing beside it.
 """
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, Self, get_args
 
-from pydantic import Strict, model_validator
+from pydantic import Field, Strict, model_validator
 
 from formation_env.scenario import config_folder, scenario_names
-from formation_env.settings import ConfigError, Field, NonNegative, Positive, Probability, Real, build, load_yaml
-from formation_env.settings import nearest, settings
+from formation_env.settings import (
+    ConfigError,
+    NonNegative,
+    Positive,
+    Probability,
+    Real,
+    build,
+    load_yaml,
+    nearest,
+    settings,
+)
 
 Algorithm = Literal["ppo", "sac"]
 ALGORITHMS: Final[tuple[Algorithm, ...]] = get_args(Algorithm)
@@ -76,10 +85,9 @@ class PPOSettings:
     @model_validator(mode="after")
     def _check(self) -> Self:
         """Refuse a rollout that is no whole number of batches: its last one would be small and noisy."""
-        if self.rows * self.rollout_steps % self.batch_size:
-            raise ValueError(
-                f"batch_size: must divide rows * rollout_steps = {self.rows * self.rollout_steps}, got {self.batch_size}"
-            )
+        samples = self.rows * self.rollout_steps
+        if samples % self.batch_size:
+            raise ValueError(f"batch_size: must divide rows * rollout_steps = {samples}, got {self.batch_size}")
         return self
 
 

@@ -2,7 +2,7 @@
 
 import time
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import pandas as pd
 from stable_baselines3.common.callbacks import BaseCallback
@@ -33,7 +33,7 @@ class Validation(BaseCallback):
         lines: of the curve: steps, seconds, return, return_low, return_high, and `MEANS`.
     """
 
-    def __init__(self, run: Run, folder: Path, bar: "tqdm[None]") -> None:
+    def __init__(self, run: Run, folder: Path, bar: "tqdm[Any]") -> None:
         super().__init__()
         self._run = run
         self._folder = folder

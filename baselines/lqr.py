@@ -11,10 +11,9 @@ from baselines.policy import AccelerationPolicy, Observations
 from baselines.riccati import least_fuel_gains, stationary_gain
 from baselines.weights import Weights
 from formation_env.dynamics.base import Array
-from formation_env.observation import SIGMA_DECADES, SIGMA_UNIT_POS_M, SIGMA_UNIT_VEL_M_S
 from formation_env.scenario import Scenario
-from formation_env.schedule import Leg, legs, observation_layout
-from formation_env.settings import Flag, NonNegative, Positive, settings
+from formation_env.schedule import Leg, legs
+from formation_env.settings import Flag, Positive, settings
 
 
 @settings
@@ -42,15 +41,12 @@ class LQRSettings:
     Attributes:
         guidance: the desired path of transfers, see `baselines.guidance`.
         feedforward: whether the thrust that the desired path itself takes is added.
-        deadband_sigmas: in hold, no thrust while position and velocity errors are both below this many of the filter's
-            sigmas.
         hold: weights in hold.
         transfer: how transfers are flown.
     """
 
     guidance: Guide = "automatic"
     feedforward: Flag = True
-    deadband_sigmas: NonNegative = 0.0
     hold: Weights = Weights(velocity_s2=(1e5, 1e5, 1e5), control_s2=(3e5, 3e5, 3e5))
     transfer: TransferSettings = TransferSettings()
 
@@ -63,7 +59,6 @@ class LQR(AccelerationPolicy):
     def __init__(self, scenario: Scenario, gains: LQRSettings) -> None:
         super().__init__(scenario)
         self.gains = gains
-        self._layout = observation_layout(scenario)
         self._guidance = Guidance(scenario, gains.guidance)
         self._to_accel = np.linalg.pinv(scenario.filter_model().Gamma) * gains.feedforward
         self.K = gain_table(scenario, gains)
@@ -73,18 +68,7 @@ class LQR(AccelerationPolicy):
         now = self._guidance.track(observation)
         K = self.K[now.phase, now.steps_to_arrival]
         feedback = -(K @ now.error[..., None])[..., 0]
-        if self.gains.deadband_sigmas > 0:
-            feedback *= self._outside(observation, now.error, now.steps_to_arrival)[..., None]
         return feedback + now.residual @ self._to_accel.T
-
-    def _outside(self, observation: Observations, error: Array, steps_to_arrival: Array) -> Array:
-        """Where (...) there is something to do: in transfer, or beyond the deadband."""
-        outside = steps_to_arrival > 0
-        blocks = (("sigma_pos", SIGMA_UNIT_POS_M, slice(3)), ("sigma_vel", SIGMA_UNIT_VEL_M_S, slice(3, 6)))
-        for name, unit, axes in blocks:
-            sigma = unit * 10 ** (SIGMA_DECADES * self._layout.scalar(observation, name))
-            outside |= np.linalg.norm(error[..., axes], axis=-1) > self.gains.deadband_sigmas * sigma
-        return outside
 
 
 def gain_table(scenario: Scenario, gains: LQRSettings) -> Array:

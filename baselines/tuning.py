@@ -55,7 +55,7 @@ def _regulator(section: str) -> tuple[Knob, ...]:
 
 STAGES: Final[dict[str, tuple[tuple[Knob, ...], ...]]] = {
     "lqr": (
-        (*_regulator("hold"), Knob(("deadband_sigmas",), -1, 1)),
+        _regulator("hold"),
         (
             Knob(tuple(f"transfer.weights.velocity_s2.{axis}" for axis in range(3)), 4, 8),
             Knob(tuple(f"transfer.weights.control_s2.{axis}" for axis in range(3)), -4, 4),

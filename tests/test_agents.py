@@ -31,7 +31,7 @@ phases:
 """
 SMALL = {
     "ppo": "{rows: 8, rollout_steps: 16, batch_size: 64, epochs: 1, network: {hidden: [8]}}",
-    "sac": "{rows: 8, gradient_steps: 1, batch_size: 16, buffer_size: 500, learning_starts: 64, network: {hidden: [8]}}",
+    "sac": "{rows: 8, batch_size: 16, buffer_size: 500, learning_starts: 64, network: {hidden: [8]}}",
 }
 
 
@@ -229,13 +229,13 @@ def test_mistakes_on_the_command_line_are_one_line(tmp_path: Path, arguments: li
 
 def test_a_folder_without_run_or_model_is_one_line(tmp_path: Path) -> None:
     """What is missing or damaged is named."""
-    with pytest.raises(ConfigError, match="settings.json: cannot be read: No such file"):
+    with pytest.raises(ConfigError, match=r"settings\.json: cannot be read: No such file"):
         load_policy(tmp_path)
     start_run(small_run(tmp_path, "ppo"), tmp_path)
-    with pytest.raises(ConfigError, match="model.zip: no such file"):
+    with pytest.raises(ConfigError, match=r"model\.zip: no such file"):
         load_policy(tmp_path)
     (tmp_path / MODEL).write_text("no model")
-    with pytest.raises(ConfigError, match="model.zip: damaged"):
+    with pytest.raises(ConfigError, match=r"model\.zip: damaged"):
         load_policy(tmp_path)
     data = json.loads((tmp_path / RUN).read_text())
     data["agent"]["gamma"] = 2

@@ -113,10 +113,12 @@ def test_seeds_and_options_count_once(scenario: Scenario) -> None:
     adapter.seed(11)
     np.testing.assert_array_equal(adapter.reset(), first)
     assert not np.array_equal(first, second)
-    start = np.array([2100.0, 0, 0, 0, 0, 0])
+    start = scenario.start.formation.state(scenario.orbit) + np.array([10.0, 0, 0, 0, 0, 0])
     adapter.set_options({"initial_state": start})
-    adapter.reset()
-    np.testing.assert_array_equal(adapter.batch.simulation.row_state(0, 6).shape, (6,))
+    adapter.seed(11)
+    expected, _ = FormationVectorEnv(ROWS, scenario).reset(seed=11, options={"initial_state": start})
+    np.testing.assert_array_equal(adapter.reset(), expected)
+    assert not np.array_equal(expected, first)
     adapter.set_options([{"initial_state": start}] + [{}] * (ROWS - 1))
     with pytest.raises(ValueError, match="initial_state must be given to all rows or to none"):
         adapter.reset()
@@ -132,8 +134,8 @@ def test_staggered_rows_end_at_different_times() -> None:
     ends = [np.flatnonzero(adapter.step(coast)[2]) for _ in range(2 * scenario.num_steps)]
     steps = [step for step, rows in enumerate(ends) for _ in rows]
     begins = np.arange(ROWS) * scenario.num_steps // ROWS
-    last = scenario.num_steps - 1
-    expected = sorted({*((begins - 1) % scenario.num_steps)}) + sorted({*((begins - 1) % scenario.num_steps + last + 1)})
+    first = np.sort((begins - 1) % scenario.num_steps)
+    expected = [*first, *(first + scenario.num_steps)]
     assert steps == expected
 
 

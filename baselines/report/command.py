@@ -42,7 +42,7 @@ def run_report(
         package: whose command line this is.
 
     Raises:
-        SystemExit: 1 after a failure, 130 after an interrupt.
+        SystemExit: 2 after a mistake in the options, 1 after another failure, 130 after an interrupt.
     """
     signal.signal(signal.SIGTERM, _interrupt)
     command = shlex.join(["python", "-m", package, *sys.argv[1:]])
@@ -55,7 +55,7 @@ def run_report(
     except ModuleNotFoundError as error:
         _end(f"report: needs {error.name}; install it with: pip install 'formation-env[report]'", 1)
     except ConfigError as error:
-        _end(str(error), 1)
+        _end(str(error), 2)
     except OSError as error:
         _end(f"report: {out}: cannot be written: {error.strerror or error}", 1)
     typer.echo(f"wrote {page}")

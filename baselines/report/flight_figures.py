@@ -28,7 +28,7 @@ def time_figure(results: Results, looks: Looks) -> go.Figure:
         shown = flight.iloc[style.thinned(len(flight))]
         time = (shown["time_s"] / period_s).to_numpy(np.float32)
         total = flight["delta_v_m_s"].cumsum().loc[shown.index]
-        thrust = 1e3 * np.linalg.norm(shown[_THRUST].to_numpy(), axis=1)
+        thrust = 1e3 * np.linalg.norm(flight[_THRUST].shift(-1).ffill().loc[shown.index].to_numpy(), axis=1)
         for row, values in enumerate((shown["position_error_m"].to_numpy(), thrust, total.to_numpy()), start=1):
             trace = _line(time, values, name, looks, first=row == 1, stepped=row == 2)
             trace.update(visible="legendonly" if name in results.hidden else True)
@@ -46,10 +46,10 @@ def time_figure(results: Results, looks: Looks) -> go.Figure:
 
 
 def _line(time: np.ndarray, values: np.ndarray, name: str, looks: Looks, first: bool, stepped: bool) -> go.Scatter:
-    """One quantity of one flight; the thrust at an instant is that of the step before it."""
+    """One quantity of one flight; the thrust holds from an instant on."""
     look = looks[name]
     line = {"color": look.color, "dash": look.dash, "width": 1.2 if stepped else 1.8}
-    line["shape"] = "vh" if stepped else "linear"
+    line["shape"] = "hv" if stepped else "linear"
     trace = go.Scatter(x=time, y=values.astype(np.float32), mode="lines", line=line, name=name)
     return trace.update(legendgroup=name, showlegend=first, hovertemplate="%{y:.4g}")
 

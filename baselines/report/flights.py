@@ -74,7 +74,7 @@ def fly(policies: Mapping[str, PolicyFactory], envs: Sequence[Environment], seed
     total = sum(named[label].num_steps * (len(seeds) + 1) * len(crew) for label, crew in crews.items())
     first = "flying (the very first run compiles the kernel)"
     with tqdm(total=total, desc=first, unit="step", unit_scale=True, smoothing=0.1, dynamic_ncols=True) as bar:
-        return [_fly_one(label, named[label], crew, policies, seeds, bar) for label, crew in crews.items()]
+        return [_fly_one(label, named[label], crew, seeds, bar) for label, crew in crews.items()]
 
 
 def _crew(policies: Mapping[str, PolicyFactory], label: str, scenario: Scenario) -> dict[str, Policy]:
@@ -90,7 +90,6 @@ def _fly_one(
     label: str,
     scenario: Scenario,
     crew: Mapping[str, Policy],
-    policies: Mapping[str, PolicyFactory],
     seeds: Sequence[int],
     bar: "tqdm[Any]",
 ) -> Flown:
@@ -102,8 +101,8 @@ def _fly_one(
         bar.update(flown_before + expected - bar.n)  # episodes that ended early
     seed = _typical_seed(episodes)
     flights = {}
-    for name in crew:
-        flights[name] = record(policies[name](scenario), scenario, seed)  # a fresh policy: no state is carried over
+    for name, policy in crew.items():
+        flights[name] = record(policy, scenario, seed)
         bar.update(scenario.num_steps)
     settings = {name: described for name, policy in crew.items() if (described := describe(policy)) is not None}
     return Flown(label, scenario, episodes, seed, flights, settings)

@@ -25,7 +25,7 @@ COLUMNS: dict[str, tuple[str, str, float]] = {
     "position_error_arrival_m": ("arrival error", "m", 1.0),
     "position_error_final_m": ("final error", "m", 1.0),
     "in_tolerance": ("in tolerance", "% of hold", 100.0),
-    "measurements_lost": ("measurements lost", "%", 100.0),
+    "measurements_lost": ("data lost", "%", 100.0),
 }
 _NEVER_BEST = ("measurements_lost",)
 

@@ -15,8 +15,8 @@ COMPARED = ("return", "delta_v_m_s", "position_error_mean_m")
 """Metrics whose paired differences are given."""
 REFERENCE = "lqr"
 """Besides the best policy, the one that all are compared with."""
-HIDE_ABOVE = 10.0
-"""Policies that cost this many times more than the best one are hidden at first in the pictures of flights."""
+HIDE_ABOVE = 3.0
+"""Policies that cost this many times more than the best one are hidden at first in the pictures, as they would squash the axes."""
 
 Interval = tuple[float, float, float]
 """Mean, low and high end of its 95 % interval."""
@@ -142,13 +142,14 @@ def number(value: float) -> str:
 
 
 def numbers(interval: Interval, factor: float = 1.0) -> tuple[str, str, str]:
-    """Mean, low and high for people, with as many decimals as show two digits of the interval's width."""
+    """Mean, low and high for people, with decimals for two digits of the interval's width, but at most four digits."""
     values = [factor * value for value in interval]
     width = abs(values[2] - values[1])
     if not width > 0:
         mean, low, high = (number(value) for value in values)
         return mean, low, high
-    decimals = max(0, 1 - math.floor(math.log10(width)))
+    digits = 3 - math.floor(math.log10(max(abs(values[0]), width)))
+    decimals = max(0, min(digits, 1 - math.floor(math.log10(width))))
     mean, low, high = (f"{value:,.{decimals}f}".replace("-", "−") for value in values)
     return mean, low, high
 

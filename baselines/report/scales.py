@@ -42,6 +42,7 @@ class Scale:
         return {
             f"{axis}.type": "log" if self.log else "linear",
             f"{axis}.range": ends,
+            f"{axis}.tickformat": "~g",
             f"{axis}.dtick": 1 if wide else "D2" if self.log else None,
         }
 
@@ -78,5 +79,5 @@ def view_buttons(labels: list[str], updates: list[list[dict[str, Any]]]) -> dict
         {"label": label, "method": "update", "args": update} for label, update in zip(labels, updates, strict=True)
     ]
     look = {"bgcolor": "rgba(128,134,144,0.15)", "bordercolor": "rgba(128,134,144,0.4)", "font": {"size": 12}}
-    place = {"direction": "right", "x": 0, "xanchor": "left", "y": 1.0, "yanchor": "bottom", "pad": {"b": 6}}
+    place = {"direction": "right", "x": 0, "xanchor": "left", "y": 1.0, "yanchor": "bottom", "pad": {"b": 6, "t": 0}}
     return {"type": "buttons", "buttons": buttons, "showactive": False} | look | place

@@ -31,9 +31,10 @@ def cost_figure(results: Results, looks: Looks) -> go.Figure:
         figure.data[-1].update(customdata=seeds, hovertemplate="%{x:.4g} m/s, seed %{customdata}", name=name)
         figure.add_trace(_mean_bar(results.interval(name, "return"), row, name))
     figure.update_xaxes(style.axis("cost = −return: Δv + weighted mean error, m/s"))
-    figure.update_yaxes(style.axis(""), tickvals=list(range(len(rows))), ticktext=rows, range=[-0.6, len(rows) - 0.4])
+    figure.update_yaxes(style.axis(""), tickvals=list(range(len(rows))), ticktext=rows)
     scales = _views([costs[name] for name in rows], [costs[name] for name in rows if name not in results.hidden])
-    _apply(figure, [scale.settings("xaxis") for scale in scales])
+    first = {"yaxis.range": [len(results.hidden) - 0.6, len(rows) - 0.4]}, {"yaxis.range": [-0.6, len(rows) - 0.4]}
+    _apply(figure, [scale.settings("xaxis") | ends for scale, ends in zip(scales, first, strict=False)])
     return figure
 
 
@@ -137,7 +138,8 @@ def equal_cost_lines(reward: Reward, x: Scale, y: Scale) -> Iterable[go.Scatter]
         if inside.sum() < 2:
             continue
         thrust, error = thrust[inside].astype(np.float32), error[inside].astype(np.float32)
-        text = [f"{cost:g} m/s"] + [""] * (len(thrust) - 1)
-        line = go.Scatter(x=thrust, y=error, mode="lines+text", text=text, textposition="bottom right")
+        text = [""] * len(thrust)
+        text[-1 if error[-1] < 1.05 * y.low + 0.02 * (y.high - y.low) * (not y.log) else 0] = f"{cost:g} m/s"
+        line = go.Scatter(x=thrust, y=error, mode="lines+text", text=text, textposition="top right")
         line.update(line={"color": style.NEUTRAL, "width": 1, "dash": "dot"}, showlegend=False, hoverinfo="skip")
         yield line.update(textfont={"size": 11, "color": style.NEUTRAL})

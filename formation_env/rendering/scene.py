@@ -30,8 +30,8 @@ TITLE_CHARACTERS: Final = 80
 
 # Place of each view, px from the lower left: left, bottom, size; what points upward; whether it is a close-up; title.
 _VIEWS: Final = (
-    (62, 86, 330, 0, False, "Orbit plane, from the side"),
-    (440, 86, 330, 2, False, "Local horizontal, from above"),
+    (66, 92, 318, 0, False, "Orbit plane, from the side"),
+    (448, 92, 318, 2, False, "Local horizontal, from above"),
     (828, 286, 116, 0, True, "Follower, close up"),
     (828, 106, 116, 2, True, ""),
 )

@@ -50,12 +50,10 @@ class View:
         self.axes, self._pick, self._close_up = axes, [1, up], close_up
         self._unit_m = 1.0
         self._lines = {name: axes.plot([], [], **style)[0] for name, style in STYLES.items()}
-        arrow: dict[str, Any] = {
-            "scale_units": "width",
-            "scale": 1 / FULL_THRUST,
-            "width": 0.036 if close_up else 0.015,
-        }
-        self._arrow = axes.quiver([0], [0], [0], [0], color=GREEN, minlength=0, zorder=2.5, **arrow)
+        self._arrow = axes.quiver(
+            [0], [0], [0], [0], color=GREEN, minlength=0, scale_units="width", scale=1 / FULL_THRUST
+        )
+        self._arrow.width = 0.036 if close_up else 0.015
         still = () if close_up else STILL
         lines = [line for name, line in self._lines.items() if name not in still]
         self.moving: list[Artist] = [self._arrow, *lines]
