@@ -27,7 +27,7 @@ def _plain_errors() -> Iterator[None]:
     except (ConfigError, OSError) as error:
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(MISTAKE) from None
-    except ImportError as error:
+    except ModuleNotFoundError as error:
         typer.echo(f"error: {error}; pip install 'formation-env[rl,report]'", err=True)
         raise typer.Exit(MISTAKE) from None
 

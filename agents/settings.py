@@ -66,13 +66,13 @@ class PPOSettings:
         network: layers.
     """
 
-    rows: Count = 256
+    rows: Count = 128
     rollout_steps: Count = 128
-    batch_size: Annotated[int, Strict(), Field(ge=2)] = 1024
+    batch_size: Annotated[int, Strict(), Field(ge=2)] = 512
     epochs: Count = 5
-    learning_rate: Positive = 7e-4
-    learning_rate_end: NonNegative = 7e-5
-    gamma: Probability = 0.99
+    learning_rate: Positive = 1e-3
+    learning_rate_end: NonNegative = 1e-4
+    gamma: Probability = 0.995
     gae_lambda: Probability = 0.95
     clip_range: Positive = 0.2
     entropy_coef: NonNegative = 0.0

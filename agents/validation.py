@@ -47,7 +47,7 @@ class Validation(BaseCallback):
             self.note()
 
     def _on_step(self) -> bool:
-        self._bar.update(self.training_env.num_envs)
+        self._bar.update(min(self.training_env.num_envs, self._run.steps - self._bar.n))
         return True
 
     def note(self) -> None:

@@ -16,7 +16,7 @@ COMPARED = ("return", "delta_v_m_s", "position_error_mean_m")
 REFERENCE = "lqr"
 """Besides the best policy, the one that all are compared with."""
 HIDE_ABOVE = 3.0
-"""Policies that cost this many times more than the best one are hidden at first in the pictures, as they would squash the axes."""
+"""Policies that cost this many times as much as the best are hidden at first in the pictures, or they squash them."""
 
 Interval = tuple[float, float, float]
 """Mean, low and high end of its 95 % interval."""

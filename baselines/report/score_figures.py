@@ -139,7 +139,7 @@ def equal_cost_lines(reward: Reward, x: Scale, y: Scale) -> Iterable[go.Scatter]
             continue
         thrust, error = thrust[inside].astype(np.float32), error[inside].astype(np.float32)
         text = [""] * len(thrust)
-        text[-1 if error[-1] < 1.05 * y.low + 0.02 * (y.high - y.low) * (not y.log) else 0] = f"{cost:g} m/s"
+        text[-1 if cost < x.high else 0] = f"{cost:g} m/s"  # where the line leaves the frame below, or at its start
         line = go.Scatter(x=thrust, y=error, mode="lines+text", text=text, textposition="top right")
         line.update(line={"color": style.NEUTRAL, "width": 1, "dash": "dot"}, showlegend=False, hoverinfo="skip")
         yield line.update(textfont={"size": 11, "color": style.NEUTRAL})

@@ -43,7 +43,7 @@ _NUMBERS: Final = (
     (514, "position error"),
     (616, "filter 1σ"),
     (698, "thrust"),
-    (808, "Δv used"),
+    (818, "Δv used"),
 )
 _PHASE_LEFT_PX: Final = 152
 
@@ -93,10 +93,10 @@ class Scene:
         for view, (*_, name) in zip(self._views, _VIEWS, strict=True):
             view.axes.set_title(name, fontsize=9, color=GREY, pad=4)
         full_mm_s2 = 1000 * self._scenario.spacecraft.max_accel_m_s2
-        label = f"thrust (√ scale, full {full_mm_s2:g} mm/s²)"
+        label = f"thrust (√ scale, ≤ {full_mm_s2:g} mm/s² per axis)"
         thrust = {"color": GREEN, "marker": r"$\rightarrow$", "ls": "", "ms": 13, "label": label}
         lines = [Line2D([], [], **style) for style in (*STYLES.values(), thrust) if "label" in style]
-        spacing = {"handletextpad": 0.4, "columnspacing": 1.2, "handlelength": 1.4, "borderaxespad": 0.5}
+        spacing = {"handletextpad": 0.4, "columnspacing": 1.1, "handlelength": 1.4, "borderaxespad": 0.5}
         self._figure.legend(
             handles=lines, loc="lower center", ncols=len(lines), frameon=False, fontsize=8.5, **spacing
         )  # fmt: skip

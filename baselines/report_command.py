@@ -1,4 +1,4 @@
-"""The command `report`."""
+"""The command `report`; the report's libraries are imported only when it runs."""
 
 import shlex
 import signal

@@ -1,0 +1,247 @@
+"""The report: complete, self-contained, on equal seeds, and written all or nothing."""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from plotly.offline import get_plotlyjs
+
+from baselines.floors import Random, RandomSettings, Zero, ZeroSettings
+from baselines.report import FILES, style, write_report
+from baselines.report.flight_figures import outage_path
+from baselines.report.output import write_files
+from baselines.report.results import numbers, significant
+from baselines.report.scales import Scale, round_values
+from formation_env import ConfigError, Scenario, load_scenario
+from formation_env.metrics import METRICS
+from formation_env.settings import build
+
+EPISODES = 3
+COMMAND = "python -m baselines report --episodes 3"
+SHORT = {
+    "title": "A short flight <with> a transfer & a hold",
+    "phases": [
+        {"formation": {"kind": "following", "y0_m": 200}, "transfer_periods": 0.05, "hold_periods": 0.05},
+        {"formation": {"kind": "space_circle", "x0_m": 100, "vx0_m_s": 0.1}, "hold_periods": 0.05},
+    ],
+    "dropout": {"kind": "bernoulli", "loss_probability": 0.3},
+}
+
+
+def zero(scenario: Scenario) -> Zero:
+    return Zero(scenario, ZeroSettings())
+
+
+def random(scenario: Scenario) -> Random:
+    return Random(scenario, RandomSettings())
+
+
+def only_short(scenario: Scenario) -> Zero | None:
+    return zero(scenario) if len(scenario.phases) == 2 else None
+
+
+POLICIES = {"zero": zero, "random": random, "learned_one": only_short}
+
+
+def short_scenarios() -> list[Scenario]:
+    one = SHORT | {"phases": SHORT["phases"][:1], "title": "One phase"}
+    return [build(Scenario, SHORT, "test"), build(Scenario, one, "test")]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("report") / "deep" / "folder"
+    assert write_report(POLICIES, short_scenarios(), EPISODES, out, COMMAND) == out / "report.html"
+    return out
+
+
+def test_all_files_and_nothing_else_are_written(folder: Path) -> None:
+    """What the command promises, without temporaries."""
+    assert sorted(path.name for path in folder.iterdir()) == sorted(FILES)
+
+
+def test_one_line_per_environment_policy_and_seed(folder: Path) -> None:
+    """The same seeds for all policies; a policy that has none for a scenario is left out there."""
+    table = pd.read_csv(folder / "episodes.csv")
+    assert list(table.columns) == ["env", "policy", "seed", *METRICS]
+    flown = table.groupby(["env", "policy"])["seed"].apply(list).to_dict()
+    titles = [scenario.title for scenario in short_scenarios()]
+    expected = {(title, name) for title in titles for name in ("zero", "random")} | {(titles[0], "learned_one")}
+    assert set(flown) == expected
+    assert all(seeds == list(range(EPISODES)) for seeds in flown.values())
+
+
+def test_means_are_those_of_the_episodes(folder: Path) -> None:
+    """summary.csv against pandas over episodes.csv; they differ by the rounding of sums only."""
+    episodes = pd.read_csv(folder / "episodes.csv")
+    summary = pd.read_csv(folder / "summary.csv").set_index(["env", "policy", "metric"])
+    means = episodes.groupby(["env", "policy"])[list(METRICS)].mean().stack()
+    np.testing.assert_allclose(summary.loc[means.index, "mean"], means, rtol=1e-12)
+    assert (summary["low"] <= summary["mean"] + 1e-12).all()
+    assert (summary["mean"] <= summary["high"] + 1e-12).all()
+
+
+def test_json_is_complete(folder: Path) -> None:
+    """Seeds, versions, command, settings that build the same scenario, summaries, paired differences."""
+
+    def refuse(word: str) -> None:
+        raise AssertionError(f"not strict JSON: {word}")
+
+    data = json.loads((folder / "report.json").read_text(encoding="utf-8"), parse_constant=refuse)
+    assert data["seeds"] == list(range(EPISODES))
+    assert data["command"] == COMMAND
+    assert {"python", "numpy", "gymnasium", "formation_env"} <= set(data["versions"])
+    for scenario in short_scenarios():
+        environment = data["environments"][scenario.title]
+        assert _rebuilt(environment["scenario"]) == scenario
+        for name, policy in environment["policies"].items():
+            assert set(policy["summary"]) == set(METRICS)
+            best = environment["ranking"][0]
+            assert name == best or set(policy["paired_differences"][best]["return"]) == {"mean", "low", "high"}
+
+
+def _rebuilt(settings: dict[str, object]) -> Scenario:
+    """Settings from JSON, whose lists stand for YAML's and whose null leader was never given."""
+    return build(Scenario, settings, "report.json")
+
+
+def test_page_holds_everything_and_loads_nothing(folder: Path) -> None:
+    """Every environment and policy is there; apart from plotly.js (once, inline) nothing names another resource."""
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    library = get_plotlyjs()
+    assert page.count(library) == 1
+    own = page.replace(library, "")
+    assert "A short flight &lt;with&gt; a transfer &amp; a hold" in own
+    assert "One phase" in own
+    assert all(name in own for name in POLICIES)
+    assert not re.search(r"https?://|<link|<iframe|@import|url\(|\bsrc\s*=", own)
+    assert "default-src 'none'" in own
+    assert own.count("Plotly.newPlot") == 4 * len(short_scenarios())
+    assert len(page) < 8e6
+
+
+def test_a_failure_leaves_the_old_files(folder: Path, tmp_path: Path) -> None:
+    """A policy that fails in mid-flight: no file changes, none appears."""
+
+    class Failing(Zero):
+        def predict(self, observation, state=None, episode_start=None, deterministic=True):  # type: ignore[no-untyped-def]
+            raise RuntimeError("in mid-flight")
+
+    (tmp_path / "report.html").write_text("old")
+    policies = {"zero": zero, "failing": lambda scenario: Failing(scenario, ZeroSettings())}
+    with pytest.raises(RuntimeError, match="in mid-flight"):
+        write_report(policies, short_scenarios(), EPISODES, tmp_path, COMMAND)
+    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+    assert (tmp_path / "report.html").read_text() == "old"
+
+
+@pytest.mark.parametrize("failure", [OSError("disk full"), KeyboardInterrupt()])
+def test_files_are_written_all_or_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: BaseException) -> None:
+    """The second of two files cannot be written: the first keeps its old content, no temporary stays."""
+    (tmp_path / "a.csv").write_text("old")
+    write_text = Path.write_text
+
+    def failing(self: Path, data: str, encoding: str | None = None, newline: str | None = None) -> int:
+        if "b.csv" in self.name:
+            raise failure
+        return write_text(self, data, encoding=encoding, newline=newline)
+
+    monkeypatch.setattr(Path, "write_text", failing)
+    with pytest.raises(type(failure)):
+        write_files(tmp_path, {"a.csv": "new", "b.csv": "new"})
+    assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
+    assert (tmp_path / "a.csv").read_text() == "old"
+
+
+@pytest.mark.parametrize(
+    ("envs", "message"),
+    [(["keping"], "did you mean 'keeping'"), (["keeping", "keeping"], "name each once"), ([], "no environment")],
+)
+def test_wrong_environments_are_named(tmp_path: Path, envs: list[str], message: str) -> None:
+    """A mistake in the command is found before anything flies."""
+    with pytest.raises(ConfigError, match=message):
+        write_report(POLICIES, envs, EPISODES, tmp_path / "out", COMMAND)
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_environment_without_policy_is_refused(tmp_path: Path) -> None:
+    """A report without a line says nothing."""
+    with pytest.raises(ConfigError, match="no policy for keeping"):
+        write_report({"none": lambda scenario: None}, ["keeping"], EPISODES, tmp_path, COMMAND)
+
+
+def test_ctrl_c_ends_in_one_line_and_leaves_nothing(tmp_path: Path) -> None:
+    """SIGINT during the flights of the real command: non-zero exit, one line after the progress bar, no file."""
+    out = tmp_path / "out"
+    arguments = ["report", "--episodes", "4000", "--env", "mission", "--policy", "zero", "--out", str(out)]
+    process = subprocess.Popen([sys.executable, "-m", "baselines", *arguments], stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    while process.stderr.read(1) != "%":  # the progress bar is there: the flights have begun
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors.endswith("\nreport: interrupted, nothing written\n")
+    assert "Traceback" not in errors
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("library", ["plotly", "jinja2", "tqdm"])
+def test_a_missing_library_is_one_line(library: str, tmp_path: Path) -> None:
+    """Without the report's extra the command says what to install."""
+    code = f"import sys; sys.modules[{library!r}] = None; from baselines.__main__ import app; app()"
+    command = [sys.executable, "-c", code, "report", "--episodes", "1", "--env", "keeping", "--out", str(tmp_path)]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert run.returncode == 1
+    assert run.stderr == f"report: needs {library}; install it with: pip install 'formation-env[report]'\n"
+
+
+@pytest.mark.parametrize(("option", "name"), [("--env", "keping"), ("--policy", "lqrr")])
+def test_a_mistake_is_one_line(option: str, name: str, tmp_path: Path) -> None:
+    """A misspelt name ends the command with its neighbour's name."""
+    command = [sys.executable, "-m", "baselines", "report", option, name, "--out", str(tmp_path)]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert run.returncode == 2
+    assert run.stderr.count("\n") == 1
+    assert "did you mean" in run.stderr
+
+
+def test_outages_are_the_instants_without_measurement() -> None:
+    """Lost at instants 1, 2 and 5 of 6: two bands, each reaching half a step beyond, in orbits."""
+    scenario = load_scenario("keeping")
+    path = outage_path(pd.DataFrame({"measured": [True, False, False, True, True, False]}), scenario)
+    ends = np.array([[float(x) for x in re.findall(r"([\d.]+),0 ", band)] for band in path.split("Z")[:-1]])
+    unit = scenario.dt_s / scenario.orbit.period_s
+    np.testing.assert_allclose(ends / unit, [[0.5, 2.5], [4.5, 5.5]], atol=2e-3)  # written with five decimals
+    assert outage_path(pd.DataFrame({"measured": [True, True]}), scenario) == ""
+
+
+def test_a_policy_looks_the_same_whoever_else_flies() -> None:
+    """The classical policies keep their colours; learned ones get others."""
+    alone, together = style.looks(["smc"]), style.looks(["ppo", "lqr", "smc", "sac"])
+    assert alone["smc"].color == together["smc"].color
+    assert len({look.color for look in together.values()}) == 4
+
+
+def test_numbers_show_their_interval() -> None:
+    """Two digits of the interval's width, four of the number at most; by hand."""
+    assert numbers((-1.23456, -1.2501, -1.2199)) == ("−1.235", "−1.250", "−1.220")
+    assert numbers((2043.2, 1990.4, 2101.6)) == ("2,043", "1,990", "2,102")
+    assert numbers((0.0, 0.0, 0.0)) == ("0", "0", "0")
+    assert significant((1.0, 0.1, 2.0))
+    assert not significant((1.0, -0.1, 2.0))
+
+
+def test_scales_hold_their_values() -> None:
+    """Logarithmic for wide positive values only; the values are inside; round values lie between their bounds."""
+    wide, narrow, zeros = (Scale.fit(np.array(v)) for v in ([1.0, 500.0], [1.0, 2.0], [0.0, 500.0]))
+    assert (wide.log, narrow.log, zeros.log) == (True, False, False)
+    assert wide.low < 1 < 500 < wide.high
+    assert round_values(0.9, 12.0) == [1.0, 2.0, 3.0, 5.0, 7.0, 10.0]
+    assert round_values(0.09, 12.0) == [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0]
