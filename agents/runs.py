@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 from zipfile import BadZipFile, is_zipfile
 
+import numpy as np
 from pydantic import Field, Strict
 
 from agents.files import replacing, write_text
@@ -114,13 +115,14 @@ class LearnedPolicy:
         self.scenario = run.scenario
         self.settings = run.agent
         self._policy = model.policy
+        self._scale = np.float32(run.agent.action_scale)
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Any, Any]:
         """Actions (3,) or (rows, 3), in units of max_accel_m_s2, for one observation or a batch; and `state`."""
         actions, _ = self._policy.predict(observation, deterministic=deterministic)
-        return actions, state
+        return self._scale * actions, state
 
 
 def load_policy(folder: str | Path, name: str = MODEL) -> LearnedPolicy:

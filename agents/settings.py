@@ -2,7 +2,8 @@
 
 Observations are already of order 1 and are learnt from as they are. Rewards are in m/s and small; they are multiplied
 by one constant, `reward_scale`, so that values are of order 1: unlike running statistics, a constant cannot drift, and
-a saved model needs nothing beside it.
+a saved model needs nothing beside it. Actions may be learnt in a share of the greatest thrust, `action_scale`: where a
+mission needs little of it, exploration over all of it costs far more fuel than the mission.
 """
 
 from collections.abc import Mapping
@@ -27,6 +28,7 @@ from formation_env.settings import (
 Algorithm = Literal["ppo", "sac"]
 ALGORITHMS: Final[tuple[Algorithm, ...]] = get_args(Algorithm)
 
+Share = Annotated[Probability, Field(gt=0)]
 Count = Annotated[int, Strict(), Field(ge=1)]
 
 
@@ -60,9 +62,10 @@ class PPOSettings:
         entropy_coef: weight of the entropy in the loss.
         value_coef: weight of the value error in the loss.
         max_grad_norm: gradients are cut to this norm.
-        log_std_init: natural logarithm of the first exploration noise, in units of the greatest thrust. Noise costs
-            fuel, so it starts low.
+        log_std_init: natural logarithm of the first exploration noise, in units of action_scale. Noise costs fuel, so
+            it starts low.
         reward_scale: rewards are multiplied by this, per m/s.
+        action_scale: the policy's actions are multiplied by this: its 1 is this share of the greatest thrust.
         network: layers.
     """
 
@@ -70,16 +73,17 @@ class PPOSettings:
     rollout_steps: Count = 128
     batch_size: Annotated[int, Strict(), Field(ge=2)] = 512
     epochs: Count = 5
-    learning_rate: Positive = 1e-3
-    learning_rate_end: NonNegative = 1e-4
+    learning_rate: Positive = 7e-4
+    learning_rate_end: NonNegative = 3e-5
     gamma: Probability = 0.995
     gae_lambda: Probability = 0.95
     clip_range: Positive = 0.2
     entropy_coef: NonNegative = 0.0
     value_coef: NonNegative = 0.5
     max_grad_norm: Positive = 0.5
-    log_std_init: Real = -2.5
+    log_std_init: Real = -1.0
     reward_scale: Positive = 3.0
+    action_scale: Share = 0.2
     network: Network = Network()
 
     @model_validator(mode="after")
@@ -107,6 +111,7 @@ class SACSettings:
         entropy_init: first temperature.
         target_entropy: entropy of the actions that the temperature aims at, in nats; low, since noise costs fuel.
         reward_scale: rewards are multiplied by this, per m/s.
+        action_scale: the policy's actions are multiplied by this: its 1 is this share of the greatest thrust.
         network: layers.
     """
 
@@ -117,10 +122,11 @@ class SACSettings:
     learning_starts: Count = 6_400
     learning_rate: Positive = 7e-4
     gamma: Probability = 0.99
-    tau: Annotated[Probability, Field(gt=0)] = 0.01
+    tau: Share = 0.01
     entropy_init: Positive = 0.01
     target_entropy: Real = -9.0
     reward_scale: Positive = 10.0
+    action_scale: Share = 0.1
     network: Network = Network(activation="relu")
 
 

@@ -39,7 +39,7 @@ def train(run: Run, folder: Path) -> bool:
     first = training_seeds(run.seed, run.agent.rows)[0]
     start_run(run, folder)
     torch.set_num_threads(run.threads)
-    env = FormationVecEnv(run.agent.rows, run.scenario, reward_scale=run.agent.reward_scale, stagger=True)
+    env = FormationVecEnv(run.agent.rows, run.scenario, run.agent.reward_scale, run.agent.action_scale, stagger=True)
     model = make_model(run.agent, env, run.seed)
     env.seed(first)
     model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))

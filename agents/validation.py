@@ -9,7 +9,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
 from agents.files import replacing
-from agents.runs import CURVE, LAST_MODEL, MODEL, Run, save_model
+from agents.runs import CURVE, LAST_MODEL, MODEL, LearnedPolicy, Run, save_model
 from formation_env.evaluation import Policy, bootstrap_interval, evaluate
 from formation_env.scenario import Scenario
 from formation_env.seeds import seeds
@@ -55,7 +55,7 @@ class Validation(BaseCallback):
         if self.lines and self.lines[-1]["steps"] == self.num_timesteps:
             return
         best = max((line["return"] for line in self.lines), default=-float("inf"))
-        line = validate(self.model, self._run.scenario, self._run.validation_episodes)
+        line = validate(LearnedPolicy(self._run, self.model), self._run.scenario, self._run.validation_episodes)
         elapsed_s = round(time.perf_counter() - self._start_s, 1)
         self.lines.append({"steps": self.num_timesteps, "seconds": elapsed_s, **line})
         self._log(line)

@@ -31,6 +31,7 @@ class FormationVecEnv(VecEnv):
         num_envs: int,
         scenario: str | Path | Scenario,
         reward_scale: float = 1.0,
+        action_scale: float = 1.0,
         stagger: bool = False,
     ) -> None:
         """Make the environment.
@@ -39,11 +40,13 @@ class FormationVecEnv(VecEnv):
             num_envs: rows.
             scenario: a registered id, a scenario's name or path, or a Scenario.
             reward_scale: rewards are multiplied by this, units per m/s.
+            action_scale: actions are multiplied by this: 1 becomes this share of the greatest thrust.
             stagger: begin the rows' episodes evenly spread over an episode's length, not all at once, so that each
                 rollout sees all parts of the mission. Until a row's first end it is where coasting took it.
         """
         self.batch = FormationVectorEnv(num_envs, scenario_of(scenario))
         self.reward_scale = reward_scale
+        self.action_scale = action_scale
         self.stagger = stagger
         self._actions = np.zeros((num_envs, 3), np.float32)
         self._birth_s = time.perf_counter()
@@ -78,7 +81,7 @@ class FormationVecEnv(VecEnv):
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Keep the actions (num_envs, 3) for `step_wait`."""
-        self._actions = actions
+        self._actions = self.action_scale * actions
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], Infos]:
         """Fly one step in all rows; rows that end begin their next episode."""

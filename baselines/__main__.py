@@ -2,7 +2,7 @@
 
 import typer
 
-from baselines.report_command import report
+from baselines.commands import report
 from baselines.tuning import tune
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False)

@@ -23,7 +23,7 @@ from formation_env.schedule import Leg, leg_reference, legs, observation_layout
 
 Guide = Literal["automatic", "straight_line", "least_fuel"]
 
-_ARRIVAL_WEIGHT = 1e6
+_ARRIVAL_WEIGHT = 1e9
 """Of the planned path's error at the arrival, against its acceleration in the thesis's units: nearly a constraint."""
 
 
@@ -140,7 +140,9 @@ def least_fuel_path(scenario: Scenario, leg: Leg) -> Array:
     terminal = _ARRIVAL_WEIGHT * np.diag([1, 1, 1, n**-2, n**-2, n**-2])
     limit = 0.9 * scenario.spacecraft.max_accel_m_s2
     gains = least_fuel_gains(model.Phi, model.Gamma, R, terminal, start, limit, rounds=30, floor=1e-3)
-    return reference + closed_loop(model.Phi, model.Gamma, gains, start)[0]
+    path = reference + closed_loop(model.Phi, model.Gamma, gains, start)[0]
+    path.setflags(write=False)
+    return path
 
 
 PATHS: Final[dict[str, Callable[[Scenario, Leg], Array]]] = {

@@ -68,7 +68,8 @@ class LQR(AccelerationPolicy):
         now = self._guidance.track(observation)
         K = self.K[now.phase, now.steps_to_arrival]
         feedback = -(K @ now.error[..., None])[..., 0]
-        return feedback + now.residual @ self._to_accel.T
+        acceleration: Array = feedback + now.residual @ self._to_accel.T
+        return acceleration
 
 
 def gain_table(scenario: Scenario, gains: LQRSettings) -> Array:
@@ -92,6 +93,7 @@ def transfer_gains(scenario: Scenario, leg: Leg, guidance: Guide, transfer: Tran
     start = nominal_start(scenario, leg) - desired_path(scenario, leg, guidance)[0]
     R = np.tile(transfer.weights.R(scenario.orbit), (leg.arrival - leg.start, 1, 1))
     limit = scenario.spacecraft.max_accel_m_s2
-    return least_fuel_gains(
-        model.Phi, model.Gamma, R, transfer.weights.Q(), start, limit, transfer.rounds, transfer.floor
-    )
+    Q, rounds, floor = transfer.weights.Q(), transfer.rounds, transfer.floor
+    gains = least_fuel_gains(model.Phi, model.Gamma, R, Q, start, limit, rounds, floor)
+    gains.setflags(write=False)
+    return gains

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Final
 import numpy as np
 import typer
 from numpy.typing import NDArray
-from scipy.optimize import differential_evolution
+from scipy.optimize import Bounds, differential_evolution
 
 from baselines.policy import Actions, Observations
 from baselines.registry import make_policy, read_gains
@@ -93,7 +93,8 @@ class SideBySide:
 def costs(policies: Sequence[Policy], scenario: Scenario, episode_seeds: Sequence[int]) -> Array:
     """Mean cost (policies,) over the same episodes, minus the mean return, m/s."""
     flown = evaluate(SideBySide(policies), scenario, [*episode_seeds] * len(policies))
-    return -flown["return"].to_numpy(float).reshape(len(policies), -1).mean(axis=1)
+    per_policy: Array = -flown["return"].to_numpy(float).reshape(len(policies), -1).mean(axis=1)
+    return per_policy
 
 
 def plain(gains: Any) -> dict[str, Any]:
@@ -161,7 +162,7 @@ def search(
 
     result = differential_evolution(
         cost,
-        [(knob.low, knob.high) for knob in knobs],
+        Bounds(*np.transpose([(knob.low, knob.high) for knob in knobs])),
         x0=np.array([read(gains, knob) for knob in knobs]),
         popsize=5,
         maxiter=generations,
@@ -221,7 +222,8 @@ def section(policy: str, gains: dict[str, Any], comment: str) -> str:
     from ruamel.yaml import YAML
 
     yaml, stream = YAML(typ="safe", pure=True), StringIO()
-    yaml.default_flow_style, yaml.width, yaml.sort_base_mapping_type_on_output = None, 120, False
+    yaml.default_flow_style, yaml.width = None, 120
+    yaml.sort_base_mapping_type_on_output = False
     yaml.dump({policy: gains}, stream)
     return "".join(f"# {line}\n" for line in comment.splitlines()) + stream.getvalue()
 

@@ -90,7 +90,7 @@ def build_schedule(scenario: Scenario) -> Array:
     _column(table, "link_closed")[:] = scenario.dropout.closed(times_s)
     for name, left in (("error_price", "price_left"), ("counts", "counts_left")):
         column = _column(table, name)
-        _column(table, left)[:] = column.sum() - np.cumsum(column)
+        _column(table, left)[:] = np.cumsum(column[::-1])[::-1] - column
     return table
 
 

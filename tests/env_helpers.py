@@ -29,7 +29,7 @@ def noise_free(name: str, dropout: Dropout = NoDropout()) -> Scenario:  # noqa: 
 
 
 def restless(max_distance_m: float = 800.0) -> Scenario:
-    """A short flight about the space circle with limits so near that random actions end episodes at many different steps."""
+    """A short flight with limits so near that random actions end episodes at many different steps."""
     scenario = load_scenario("keeping")
     phases = tuple(dataclasses.replace(phase, hold_periods=0.15) for phase in scenario.phases)
     start = dataclasses.replace(scenario.start, spread_pos_m=200.0, spread_vel_m_s=0.5)
@@ -97,6 +97,14 @@ def coast(state: Array, time_s: float, scenario: Scenario) -> Array:
     return result
 
 
+def path(state: Array, steps: int, scenario: Scenario) -> list[Array]:
+    """Force-free HCW motion over 0 to `steps` steps."""
+    step, states = expm(hcw_state_matrix(mean_motion(scenario)) * scenario.dt_s), [state]
+    for _ in range(steps):
+        states.append(step @ states[-1])
+    return states
+
+
 def steps_of(periods: float, scenario: Scenario) -> int:
     """The nearest number of whole steps."""
     return int(np.floor(periods * 2 * np.pi / mean_motion(scenario) / scenario.dt_s + 0.5))
@@ -120,12 +128,9 @@ def plan(scenario: Scenario) -> list[Instant]:
         end = arrival + steps_of(phase.hold_periods, scenario)
         target = np.asarray(phase.formation.state(scenario.orbit))
         first = coast(target, (start - arrival) * scenario.dt_s, scenario)
-        step = expm(hcw_state_matrix(mean_motion(scenario)) * scenario.dt_s)
-        state = first
-        for k in range(start, end + 1):
-            if k > start or index == 0:
-                instants.append(Instant(index, k > arrival, state))
-            state = step @ state
+        states = path(first, end - start, scenario)
+        skipped = 0 if index == 0 else 1
+        instants += [Instant(index, start + k > arrival, state) for k, state in enumerate(states) if k >= skipped]
     return instants
 
 

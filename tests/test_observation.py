@@ -5,11 +5,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from env_helpers import Array, coast, covariances, fly_rows, mean_motion, random_actions, steps_of
+from env_helpers import Array, coast, covariances, mean_motion, path, random_actions, steps_of
 
 from formation_env import FormationVectorEnv, Scenario, load_scenario, propagate
 from formation_env.dropout import GilbertElliott
 from formation_env.estimation import KalmanFilter
+from formation_env.formations import Following
 from formation_env.observation import BLOCKS, BOUND, SIZE, SLICES
 from formation_env.schedule import observation_layout
 
@@ -86,19 +87,15 @@ def in_force(flight: Flight) -> tuple[Array, Array, Array]:
     return phase, table[phase, 1], table[phase, 2]
 
 
-def references(flight: Flight, steps_ahead: Array) -> Array:
-    """Reference states (instants, 6) of the phase in force, some steps ahead."""
-    phase, arrival, _ = in_force(flight)
-    return np.array(
-        [
-            coast(
-                flight.scenario.phases[p].formation.state(flight.scenario.orbit),
-                (k + ahead - a) * flight.scenario.dt_s,
-                flight.scenario,
-            )
-            for k, p, a, ahead in zip(flight.steps, phase, arrival, steps_ahead, strict=True)
-        ]
-    )
+def references(flight: Flight, at_arrival: bool = False) -> Array:
+    """Reference states (instants, 6) of the phase in force: now, or in transfer those at the arrival."""
+    states: list[Array] = []
+    for phase, (start, arrival, end) in zip(flight.scenario.phases, clock(flight.scenario), strict=True):
+        target = phase.formation.state(flight.scenario.orbit)
+        ahead = (start - arrival) * flight.scenario.dt_s
+        way = path(coast(target, ahead, flight.scenario), end - start - 1, flight.scenario)
+        states += [target] * (arrival - start) + way[arrival - start :] if at_arrival else way
+    return np.array(states)
 
 
 def assert_states(actual: Array, expected: Array, scale: Array) -> None:
@@ -121,7 +118,7 @@ def test_error_and_reference_decode_to_the_estimate(flight: Flight) -> None:
     """The layout gives back SI units: the reference of the plan, and with the error the filter's estimate."""
     layout = observation_layout(flight.scenario)
     scale = np.repeat([layout.length_m, layout.length_m * mean_motion(flight.scenario)], 3)
-    reference = np.repeat(references(flight, 0 * flight.steps)[:, None], ROWS, axis=1)
+    reference = np.repeat(references(flight)[:, None], ROWS, axis=1)
     assert_states(layout.state(flight.seen, "reference"), reference, scale)
     assert_states(layout.state(flight.seen, "error"), flight.estimates - reference, scale)
     near = np.abs((flight.estimates - reference) / scale) < BOUND
@@ -134,7 +131,7 @@ def test_arrival_error_is_where_the_estimate_coasts_to(flight: Flight) -> None:
     scenario, layout = flight.scenario, observation_layout(flight.scenario)
     _, arrival, _ = in_force(flight)
     ahead = np.maximum(arrival - flight.steps, 0)
-    goal = references(flight, ahead)
+    goal = references(flight, at_arrival=True)
     scale = np.repeat([layout.length_m, layout.length_m * mean_motion(scenario)], 3)
     for k in flight.steps[:: max(1, len(flight.steps) // 40)]:
         there = propagate(
@@ -201,11 +198,12 @@ def test_the_link_is_seen_and_how_long_it_is_down(flight: Flight) -> None:
 
 
 def test_far_away_the_observation_is_cut_at_its_bounds() -> None:
-    """A follower 1000 km off is seen at the bound, not beyond it."""
-    env = FormationVectorEnv(1, "keeping")
-    results = fly_rows(
-        env, np.zeros((1, 1, 3), np.float32), seed=0, options={"initial_state": [1e6, -1e6, 1e6, 0, 0, 0]}
-    )
-    np.testing.assert_array_equal(results[0][0][0, SLICES["error"]][:3], [BOUND, -BOUND, BOUND])
-    assert env.observation_space.contains(results[0][0])
-    assert results[1][2][0]
+    """A follower 45 km off and fast is seen at the bound where a kilometre is the unit, not beyond it."""
+    scenario = load_scenario("initialization")
+    hold = dataclasses.replace(scenario.phases[0], formation=Following(y0_m=100.0))
+    env = FormationVectorEnv(1, dataclasses.replace(scenario, phases=(hold,)))
+    start = [32e3, -32e3, 100, 0, 50, -50]
+    observations, infos = env.reset(seed=0, options={"initial_state": start})
+    assert (np.abs(infos["estimate"][0, [0, 1, 4, 5]]) > 30 * np.array([1000, 1000, 1.1, 1.1])).all()
+    np.testing.assert_array_equal(observations[0, SLICES["error"]][[0, 1, 4, 5]], [BOUND, -BOUND, BOUND, -BOUND])
+    assert env.observation_space.contains(observations)

@@ -11,7 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from plotly.offline import get_plotlyjs
+from typer.testing import CliRunner
 
+from baselines.__main__ import app
 from baselines.floors import Random, RandomSettings, Zero, ZeroSettings
 from baselines.report import FILES, style, write_report
 from baselines.report.flight_figures import outage_path
@@ -193,21 +195,22 @@ def test_ctrl_c_ends_in_one_line_and_leaves_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("library", ["plotly", "jinja2", "tqdm"])
-def test_a_missing_library_is_one_line(library: str, tmp_path: Path) -> None:
+def test_a_missing_library_is_one_line(library: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without the report's extra the command says what to install."""
-    code = f"import sys; sys.modules[{library!r}] = None; from baselines.__main__ import app; app()"
-    command = [sys.executable, "-c", code, "report", "--episodes", "1", "--env", "keeping", "--out", str(tmp_path)]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert run.returncode == 1
+    for module in [name for name in sys.modules if name.startswith(("baselines.report.", "plotly."))]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.delitem(sys.modules, "baselines.report")
+    monkeypatch.setitem(sys.modules, library, None)
+    run = CliRunner().invoke(app, ["report", "--episodes", "1", "--env", "keeping", "--out", str(tmp_path)])
+    assert run.exit_code == 1
     assert run.stderr == f"report: needs {library}; install it with: pip install 'formation-env[report]'\n"
 
 
 @pytest.mark.parametrize(("option", "name"), [("--env", "keping"), ("--policy", "lqrr")])
 def test_a_mistake_is_one_line(option: str, name: str, tmp_path: Path) -> None:
     """A misspelt name ends the command with its neighbour's name."""
-    command = [sys.executable, "-m", "baselines", "report", option, name, "--out", str(tmp_path)]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert run.returncode == 2
+    run = CliRunner().invoke(app, ["report", option, name, "--out", str(tmp_path)])
+    assert run.exit_code == 2
     assert run.stderr.count("\n") == 1
     assert "did you mean" in run.stderr
 

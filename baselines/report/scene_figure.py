@@ -94,6 +94,6 @@ def _scene(sides: np.ndarray) -> dict[str, object]:
     common = {"gridcolor": style.GRID, "zerolinecolor": style.NEUTRAL, "showbackground": False, "color": style.NEUTRAL}
     axes = {f"{name}axis": common | {"title": {"text": title}} for name, title in AXES.items()}
     longest = sides.max() / np.cbrt(sides.prod())  # plotly scales the box to unit volume
-    x, y, z = (0.95 + 0.85 * longest) * np.array([0.62, -0.67, 0.41])
-    camera = {"eye": {"x": x, "y": y, "z": z}, "center": {"x": 0, "y": 0, "z": -0.08}}
+    x, y, z = (1.3 + 0.72 * longest) * np.array([0.62, -0.67, 0.41])
+    camera = {"eye": {"x": x, "y": y, "z": z}, "center": {"x": 0, "y": 0, "z": -0.14}}
     return {**axes, "aspectmode": "data", "camera": camera, "dragmode": "turntable"}

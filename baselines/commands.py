@@ -1,4 +1,4 @@
-"""The command `report`; the report's libraries are imported only when it runs."""
+"""The command `report`. Its libraries are imported only when it runs."""
 
 import shlex
 import signal
@@ -44,8 +44,8 @@ def run_report(
     Raises:
         SystemExit: 2 after a mistake in the options, 1 after another failure, 130 after an interrupt.
     """
-    signal.signal(signal.SIGTERM, _interrupt)
     command = shlex.join(["python", "-m", package, *sys.argv[1:]])
+    before = signal.signal(signal.SIGTERM, _interrupt)
     try:
         from baselines.report import write_report
 
@@ -53,11 +53,13 @@ def run_report(
     except KeyboardInterrupt:
         _end("report: interrupted, nothing written", 130)
     except ModuleNotFoundError as error:
-        _end(f"report: needs {error.name}; install it with: pip install 'formation-env[report]'", 1)
+        _end(f"report: needs {str(error.name).split('.')[0]}; install it with: pip install 'formation-env[report]'", 1)
     except ConfigError as error:
         _end(str(error), 2)
     except OSError as error:
         _end(f"report: {out}: cannot be written: {error.strerror or error}", 1)
+    finally:
+        signal.signal(signal.SIGTERM, before)
     typer.echo(f"wrote {page}")
 
 
