@@ -41,7 +41,7 @@ def continuous_gain(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Arra
 
 
 def finite_horizon_gains(Phi: Array, Gamma: Array, Q: Array, R: Array, terminal: Array) -> Array:
-    """Gains of a finite horizon: the discrete form of Ma 2009, eq. (4.12-4.14).
+    """Gains of a finite horizon with a constant weight on the way: the discrete form of Ma 2009, eq. (4.12-4.14).
 
     Args:
         Phi: state transition matrix (6, 6).
@@ -53,13 +53,28 @@ def finite_horizon_gains(Phi: Array, Gamma: Array, Q: Array, R: Array, terminal:
     Returns:
         Gains (steps, 3, 6), from the first step on.
     """
+    return time_varying_gains(Phi, Gamma, np.concatenate([np.tile(Q, (len(R), 1, 1)), terminal[None]]), R)
+
+
+def time_varying_gains(Phi: Array, Gamma: Array, Q: Array, R: Array) -> Array:
+    """Gains of a finite horizon by the backward Riccati recursion.
+
+    Args:
+        Phi: state transition matrix (6, 6).
+        Gamma: input matrix (6, 3).
+        Q: state weights (steps + 1, 6, 6), from the first state to the last.
+        R: control weights (steps, 3, 3).
+
+    Returns:
+        Gains (steps, 3, 6), from the first step on.
+    """
     gains = np.zeros((len(R), 3, 6))
-    P = terminal
+    P = Q[-1]
     for step in reversed(range(len(R))):
         PG = P @ Gamma
         # K = (R + Gamma' P Gamma)^-1 Gamma' P Phi;  P <- Phi' P (Phi - Gamma K) + Q
         gains[step] = np.linalg.solve(R[step] + Gamma.T @ PG, PG.T @ Phi)
-        P = Phi.T @ P @ (Phi - Gamma @ gains[step]) + Q
+        P = Phi.T @ P @ (Phi - Gamma @ gains[step]) + Q[step]
         P = (P + P.T) / 2
     return gains
 

@@ -95,7 +95,7 @@ def test_equal_seeds_train_equal_models(tmp_path: Path) -> None:
 
 
 def test_saved_and_loaded_predictions_are_identical(tmp_path: Path) -> None:
-    """A saved network is the same numbers."""
+    """A saved network is the same numbers; its outputs are in units of action_scale."""
     from agents.models import make_model
     from agents.vec_env import FormationVecEnv
 
@@ -106,7 +106,9 @@ def test_saved_and_loaded_predictions_are_identical(tmp_path: Path) -> None:
     save_model(model, tmp_path / "run" / MODEL)
     observations = env.reset()
     expected, _ = model.predict(observations, deterministic=True)
-    np.testing.assert_array_equal(load_policy(tmp_path / "run").predict(observations)[0], expected)
+    loaded, _ = load_policy(tmp_path / "run").predict(observations)
+    np.testing.assert_array_equal(loaded, np.float32(run.agent.action_scale) * expected)
+    assert loaded.dtype == np.float32
 
 
 def test_a_loaded_policy_flies_one_environment_or_many(finished: tuple[Run, Path]) -> None:

@@ -105,6 +105,16 @@ def test_reward_scale_is_a_factor_and_leaves_the_statistics(scenario: Scenario) 
         ]
 
 
+def test_actions_are_in_units_of_the_action_scale(scenario: Scenario) -> None:
+    """An action of a scaled adapter is that share of it to the batched environment (a quarter: no rounding)."""
+    adapter, batch = FormationVecEnv(ROWS, scenario, action_scale=0.25), FormationVectorEnv(ROWS, scenario)
+    adapter.seed(9)
+    adapter.reset()
+    batch.reset(seed=9)
+    for action in actions(10):
+        np.testing.assert_array_equal(adapter.step(action)[0], batch.step(0.25 * action)[0])
+
+
 def test_seeds_and_options_count_once(scenario: Scenario) -> None:
     """As in SB3's own vectorised environments: equal seeds, equal episodes; the next reset goes on with the stream."""
     adapter = FormationVecEnv(ROWS, scenario)

@@ -13,7 +13,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from env_helpers import assert_same, fly, fly_rows, random_actions
+from env_helpers import assert_same, fly, fly_rows, random_actions, spoil
 from gymnasium.utils.env_checker import check_env
 from stable_baselines3.common.env_checker import check_env as check_env_sb3
 
@@ -82,18 +82,6 @@ def test_outputs_share_no_memory_with_the_inside(env: FormationEnv) -> None:
         assert result[1] == reward
         given[:] = np.nan
         spoil(result)
-
-
-def spoil(outputs: Any) -> None:
-    """Overwrite all arrays in nested tuples and dicts."""
-    if isinstance(outputs, np.ndarray) and outputs.dtype != object:
-        outputs[...] = True if outputs.dtype == bool else 77
-    elif isinstance(outputs, dict):
-        for value in outputs.values():
-            spoil(value)
-    elif isinstance(outputs, (tuple, list, np.ndarray)):
-        for value in outputs:
-            spoil(value)
 
 
 @pytest.mark.parametrize("name", ["mission", "thesis_reconfiguration"])

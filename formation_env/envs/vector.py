@@ -57,6 +57,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.simulation = Simulation(self.scenario, num_envs)
+        self._observations = self.simulation.new_observations()
         self._keyed = False
 
     def reset(
@@ -67,7 +68,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         Args:
             seed: row i gets seed + i, or the i-th of a list; without a seed the rows' streams go on.
             options: `initial_state`: true LVLH states (6,) or (num_envs, 6) to start at, m and m/s; `reset_mask`:
-                rows (num_envs,) to reset, the others stay as they are.
+                rows (num_envs,) to reset; the others stay as they are, return their last observation and have no info.
 
         Raises:
             ValueError: wrong options or number of seeds.
@@ -75,9 +76,9 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         starts = interface.read_start(options, self.simulation)
         chosen = self._mask(options)
         self._seed(seed, chosen)
-        observations = self.simulation.new_observations()
-        self.simulation.reset(chosen, observations, starts)
-        return observations, self._infos()
+        self.simulation.reset(chosen, self._observations, starts)
+        infos = self._infos()
+        return self._observations.copy(), infos if chosen.all() else _only(infos, chosen)
 
     def _mask(self, options: dict[str, Any] | None) -> Flags:
         mask = np.asarray((options or {}).get("reset_mask", np.ones(self.num_envs, bool)))
@@ -116,14 +117,13 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             raise gymnasium.error.ResetNeeded("step: call reset first")
         simulation = self.simulation
         simulation.actions[:] = actions
-        observations = simulation.new_observations()
-        simulation.step(observations)
+        simulation.step(self._observations)
         rewards = simulation.result(f.REWARD).copy()
         terminations = simulation.result(f.TERMINATED) > 0.5
         truncations = simulation.result(f.TRUNCATED) > 0.5
         ended = terminations | truncations
-        finals = self._begin_next(ended, observations) if ended.any() else {}
-        return observations, rewards, terminations, truncations, {**self._infos(), **finals}
+        finals = self._begin_next(ended, self._observations) if ended.any() else {}
+        return self._observations.copy(), rewards, terminations, truncations, {**self._infos(), **finals}
 
     def _begin_next(self, ended: Flags, observations: Observations) -> dict[str, Any]:
         """Reset the rows that ended, in place; what they ended with, in Gymnasium's form."""

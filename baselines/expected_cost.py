@@ -1,0 +1,119 @@
+"""Gains of every step of a phase from the scenario's own cost, by iteratively reweighted LQG.
+
+The return counts |u| and |e|, not their squares. With weights 1 / rms |u_k| and price / rms |e_k| of the round before, a
+quadratic cost has the same sum, and its minimum moves towards the least E|u| and E|e| (Daubechies et al. 2010,
+doi 10.1002/cpa.20303, for sums without expectation). The rms values follow from the nominal start, its spread, and the
+noises, as if no measurement were lost.
+
+Legend: Phi, Gamma model; K gain; P covariance of the estimate's error, X of the estimate; S innovation covariance.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from baselines.riccati import OVERLOAD, time_varying_gains
+from formation_env.dynamics.base import Array, DiscreteModel
+from formation_env.estimation import process_noise_covariance
+from formation_env.scenario import Scenario
+from formation_env.schedule import Leg
+
+ERROR_FLOOR_M = 0.01
+"""Position errors below this are no better than this."""
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """What the filter will know, whatever the controls are.
+
+    Attributes:
+        missed: covariances of the estimate's error just after each measurement (steps + 1, 6, 6).
+        learned: covariances of the estimate's change by each measurement (steps + 1, 6, 6).
+    """
+
+    missed: Array
+    learned: Array
+
+
+def knowledge(scenario: Scenario, model: DiscreteModel) -> Knowledge:
+    """The filter's covariances over an episode in which all measurements arrive (Ma 2009, eq. 4.71-4.75)."""
+    belief, sensor, start = scenario.filter, scenario.sensor, scenario.start
+    sigma_pos = sensor.sigma_pos_m if belief.sigma_pos_m is None else belief.sigma_pos_m
+    sigma_vel = sensor.sigma_vel_m_s if belief.sigma_vel_m_s is None else belief.sigma_vel_m_s
+    push = scenario.process_noise_m_s2 if belief.process_noise_m_s2 is None else belief.process_noise_m_s2
+    H = np.eye(6) if sensor.measures == "position_and_velocity" else np.eye(3, 6)
+    R_noise = np.diag(np.repeat([sigma_pos, sigma_vel], 3) ** 2)[: len(H), : len(H)]
+    P = np.diag(np.repeat([start.spread_pos_m, start.spread_vel_m_s], 3) ** 2)
+    missed, learned = np.zeros((2, scenario.num_steps + 1, 6, 6))
+    for step in range(scenario.num_steps + 1):
+        S = H @ P @ H.T + R_noise
+        learned[step] = P @ H.T @ np.linalg.pinv(S, hermitian=True) @ H @ P
+        missed[step] = P - learned[step]
+        P = model.Phi @ missed[step] @ model.Phi.T + process_noise_covariance(model.Gamma, push)
+    return Knowledge(missed, learned)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Root mean squares along a phase: controls (steps,), m/s^2; errors (steps + 1,), m; loudest axis (steps,)."""
+
+    control: Array
+    error: Array
+    peak: Array
+    last: Array
+
+
+def spread(model: DiscreteModel, gains: Array, start: Array, first: Array, known: Knowledge) -> Spread:
+    """How far controls and errors scatter under u = -K e_hat.
+
+    Args:
+        model: the filter's model.
+        gains: (steps, 3, 6).
+        start: mean error (6,) at the beginning.
+        first: covariance (6, 6) of the estimate about it.
+        known: of the instants of the phase.
+    """
+    second = np.outer(start, start) + first
+    control, error, peak = np.zeros(len(gains)), np.zeros(len(gains) + 1), np.zeros(len(gains))
+    for step, K in enumerate(gains):
+        squares = np.diag(K @ second @ K.T)
+        control[step], peak[step] = np.sqrt(squares.sum()), np.sqrt(squares.max())
+        error[step] = np.sqrt(np.trace((second + known.missed[step])[:3, :3]))
+        loop = model.Phi - model.Gamma @ K
+        second = loop @ second @ loop.T + known.learned[step + 1]
+    error[-1] = np.sqrt(np.trace((second + known.missed[-1])[:3, :3]))
+    return Spread(control, error, peak, second)
+
+
+def phase_gains(
+    scenario: Scenario, leg: Leg, start: Array, first: Array, known: Knowledge, rounds: int, floor: float
+) -> tuple[Array, Array]:
+    """Gains (steps, 3, 6) of a phase, and the second moment (6, 6) of the estimated error at its end.
+
+    Args:
+        scenario: what is flown.
+        leg: the phase.
+        start: mean error (6,) at the phase's beginning.
+        first: covariance (6, 6) of the estimate about it.
+        known: of the instants of the phase.
+        rounds: how often the weights are renewed.
+        floor: smallest thrust that is told from none, in units of max_accel_m_s2.
+    """
+    model, limit = scenario.filter_model(), scenario.spacecraft.max_accel_m_s2
+    steps, reward = np.arange(leg.start, leg.end + 1), scenario.reward
+    weight = np.where(steps > leg.arrival, reward.error_weight, reward.transfer_error_weight)
+    price = weight * scenario.dt_s / scenario.hold_s
+    position = np.diag([1.0, 1, 1, 0, 0, 0])
+    control_weight, error_weight = np.full(len(steps) - 1, scenario.dt_s / limit), price / 100.0
+    gains = np.zeros((len(steps) - 1, 3, 6))
+    for _ in range(rounds + 1):
+        Q, R = error_weight[:, None, None] * position, control_weight[:, None, None] * np.eye(3)
+        gains = time_varying_gains(model.Phi, model.Gamma, Q, R)
+        seen = spread(model, gains, start, first, known)
+        overload = 1 + OVERLOAD * np.maximum(seen.peak / limit - 1, 0)
+        control_weight = np.sqrt(control_weight * scenario.dt_s * overload / (seen.control + floor * limit))
+        if reward.shape == "linear":
+            error_weight = np.sqrt(error_weight * price / (seen.error + ERROR_FLOOR_M))
+        else:
+            error_weight = price / reward.quadratic_scale_m
+    return gains, seen.last
