@@ -9,17 +9,22 @@ Legend: Phi, Gamma model; K gain; P covariance of the estimate's error, X of the
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
 
 import numpy as np
 
 from baselines.riccati import OVERLOAD, time_varying_gains
+from baselines.timeline import start_error
 from formation_env.dynamics.base import Array, DiscreteModel
 from formation_env.estimation import process_noise_covariance
 from formation_env.scenario import Scenario
-from formation_env.schedule import Leg
+from formation_env.schedule import Leg, legs
 
-ERROR_FLOOR_M = 0.01
-"""Position errors below this are no better than this."""
+FIRST_ERROR_M: Final = 100.0
+"""Position error that the first round expects everywhere."""
+ERROR_FLOOR_M: Final = 0.01
+"""Added to position errors, so that no weight is infinite."""
 
 
 @dataclass(frozen=True)
@@ -44,18 +49,26 @@ def knowledge(scenario: Scenario, model: DiscreteModel) -> Knowledge:
     H = np.eye(6) if sensor.measures == "position_and_velocity" else np.eye(3, 6)
     R_noise = np.diag(np.repeat([sigma_pos, sigma_vel], 3) ** 2)[: len(H), : len(H)]
     P = np.diag(np.repeat([start.spread_pos_m, start.spread_vel_m_s], 3) ** 2)
+    Q_noise = process_noise_covariance(model.Gamma, push)
     missed, learned = np.zeros((2, scenario.num_steps + 1, 6, 6))
     for step in range(scenario.num_steps + 1):
         S = H @ P @ H.T + R_noise
         learned[step] = P @ H.T @ np.linalg.pinv(S, hermitian=True) @ H @ P
         missed[step] = P - learned[step]
-        P = model.Phi @ missed[step] @ model.Phi.T + process_noise_covariance(model.Gamma, push)
+        P = model.Phi @ missed[step] @ model.Phi.T + Q_noise
     return Knowledge(missed, learned)
 
 
 @dataclass(frozen=True)
 class Spread:
-    """Root mean squares along a phase: controls (steps,), m/s^2; errors (steps + 1,), m; loudest axis (steps,)."""
+    """Root mean squares along a phase.
+
+    Attributes:
+        control: of the acceleration (steps,), m/s^2.
+        error: of the true position error (steps + 1,), m.
+        peak: of the acceleration's loudest axis (steps,), m/s^2.
+        last: second moment (6, 6) of the estimated error at the end.
+    """
 
     control: Array
     error: Array
@@ -85,35 +98,66 @@ def spread(model: DiscreteModel, gains: Array, start: Array, first: Array, known
     return Spread(control, error, peak, second)
 
 
-def phase_gains(
-    scenario: Scenario, leg: Leg, start: Array, first: Array, known: Knowledge, rounds: int, floor: float
-) -> tuple[Array, Array]:
-    """Gains (steps, 3, 6) of a phase, and the second moment (6, 6) of the estimated error at its end.
+@lru_cache(maxsize=32)
+def expected_cost_gains(
+    scenario: Scenario, rounds: int = 30, floor: float = 3e-4, price_scale: float = 1.0
+) -> tuple[Array, ...]:
+    """Gains (steps, 3, 6) of each phase, of u = -K (x_hat - reference).
+
+    Each phase is judged by itself; its start is the nominal one with the second moment that the phase before ends with.
 
     Args:
         scenario: what is flown.
-        leg: the phase.
-        start: mean error (6,) at the phase's beginning.
-        first: covariance (6, 6) of the estimate about it.
-        known: of the instants of the phase.
         rounds: how often the weights are renewed.
         floor: smallest thrust that is told from none, in units of max_accel_m_s2.
+        price_scale: factor of the scenario's price of errors.
     """
-    model, limit = scenario.filter_model(), scenario.spacecraft.max_accel_m_s2
-    steps, reward = np.arange(leg.start, leg.end + 1), scenario.reward
-    weight = np.where(steps > leg.arrival, reward.error_weight, reward.transfer_error_weight)
-    price = weight * scenario.dt_s / scenario.hold_s
-    position = np.diag([1.0, 1, 1, 0, 0, 0])
-    control_weight, error_weight = np.full(len(steps) - 1, scenario.dt_s / limit), price / 100.0
-    gains = np.zeros((len(steps) - 1, 3, 6))
+    known = knowledge(scenario, scenario.filter_model())
+    first, result = known.learned[0], []
+    for leg in legs(scenario):
+        instants = slice(leg.start, leg.end + 1)
+        here = Knowledge(known.missed[instants], known.learned[instants])
+        start = start_error(scenario, leg)
+        gains, first = _phase_gains(scenario, leg, start, first, here, rounds, floor, price_scale)
+        gains.setflags(write=False)
+        result.append(gains)
+    return tuple(result)
+
+
+def _phase_gains(
+    scenario: Scenario,
+    leg: Leg,
+    start: Array,
+    first: Array,
+    known: Knowledge,
+    rounds: int,
+    floor: float,
+    price_scale: float,
+) -> tuple[Array, Array]:
+    """Gains of a phase, and the second moment (6, 6) of the estimated error at its end."""
+    model, limit, position = scenario.filter_model(), scenario.spacecraft.max_accel_m_s2, np.diag([1.0, 1, 1, 0, 0, 0])
+    price = price_scale * _error_price(scenario, leg)
+    control_weight, error_weight = np.full(leg.end - leg.start, scenario.dt_s / limit), price / FIRST_ERROR_M
     for _ in range(rounds + 1):
         Q, R = error_weight[:, None, None] * position, control_weight[:, None, None] * np.eye(3)
         gains = time_varying_gains(model.Phi, model.Gamma, Q, R)
         seen = spread(model, gains, start, first, known)
         overload = 1 + OVERLOAD * np.maximum(seen.peak / limit - 1, 0)
         control_weight = np.sqrt(control_weight * scenario.dt_s * overload / (seen.control + floor * limit))
-        if reward.shape == "linear":
-            error_weight = np.sqrt(error_weight * price / (seen.error + ERROR_FLOOR_M))
-        else:
-            error_weight = price / reward.quadratic_scale_m
+        error_weight = np.sqrt(error_weight * price * _steepness(scenario, seen.error))
     return gains, seen.last
+
+
+def _error_price(scenario: Scenario, leg: Leg) -> Array:
+    """Price (steps + 1,) of an error at each instant of a phase, (m/s) per m."""
+    reward = scenario.reward
+    in_hold = np.arange(leg.start, leg.end + 1) > leg.arrival
+    weight = np.where(in_hold, reward.error_weight, reward.transfer_error_weight)
+    return weight * scenario.dt_s / scenario.hold_s
+
+
+def _steepness(scenario: Scenario, error_m: Array) -> Array:
+    """Cost per price and squared error (...), 1/m."""
+    if scenario.reward.shape == "quadratic":
+        return np.full(error_m.shape, 1 / scenario.reward.quadratic_scale_m)
+    return 1 / (error_m + ERROR_FLOOR_M)

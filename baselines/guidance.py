@@ -1,10 +1,9 @@
 """Where the follower should be at each instant: the desired path, as an offset from the reference.
 
-In hold the desired path is the reference. During a transfer it may be
-
-- `automatic`: the reference as well, so the controller finds the way (Ma 2009, section 3.2.3);
-- `straight_line`: a straight line in LVLH at constant speed (section 3.2.2);
-- `least_fuel`: the path of few burns that `riccati.least_fuel_gains` finds for the nominal start.
+- `automatic`: the reference, even before the arrival, so the controller finds the way (Ma 2009, section 3.2.3);
+- `straight_line`: to the arrival on a straight line in LVLH at constant speed (section 3.2.2);
+- `least_fuel`: to the arrival on the path of few burns that `riccati.least_fuel_gains` finds for the nominal start;
+- `least_cost`: through the whole phase on the mean path of `expected_cost`, which may settle after the arrival.
 """
 
 from collections.abc import Callable
@@ -13,15 +12,18 @@ from functools import lru_cache
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
+from baselines.expected_cost import expected_cost_gains
 from baselines.policy import Observations
 from baselines.riccati import closed_loop, least_fuel_gains
+from baselines.timeline import longest_phase, nominal_start, start_error, transfer_reference
 from formation_env.dynamics import transition_matrix
 from formation_env.dynamics.base import Array
 from formation_env.scenario import Scenario
 from formation_env.schedule import Leg, leg_reference, legs, observation_layout
 
-Guide = Literal["automatic", "straight_line", "least_fuel"]
+Guide = Literal["automatic", "straight_line", "least_fuel", "least_cost"]
 
 _ARRIVAL_WEIGHT = 1e9
 """Of the planned path's error at the arrival, against its acceleration in the thesis's units: nearly a constraint."""
@@ -36,23 +38,25 @@ class Tracking:
         desired: desired state (..., 6).
         residual: what the filter's model lacks to go along the desired path by itself over the next step, (..., 6).
         phase: index of the phase (...).
-        steps_to_arrival: (...), 0 in hold.
+        steps_left: steps to its end (...).
+        in_hold: whether it has arrived (...).
     """
 
     error: Array
     desired: Array
     residual: Array
-    phase: np.ndarray
-    steps_to_arrival: np.ndarray
+    phase: NDArray[np.intp]
+    steps_left: NDArray[np.intp]
+    in_hold: NDArray[np.bool_]
 
 
 class Guidance:
-    """The desired path of a scenario, looked up by phase and time to arrival."""
+    """The desired path of a scenario, looked up by phase and steps left."""
 
     def __init__(self, scenario: Scenario, guide: Guide) -> None:
         model = scenario.filter_model()
         step = transition_matrix(scenario.orbit.mean_motion_rad_s, scenario.dt_s)
-        self._scenario = scenario
+        self._dt_s = scenario.dt_s
         self._layout = observation_layout(scenario)
         self._reference_residual = step - model.Phi
         self._delta = model.delta
@@ -71,7 +75,7 @@ class Guidance:
         layout = self._layout
         reference = layout.state(observation, "reference")
         phase = layout.phase(observation)
-        steps = np.rint(layout.time_to_arrival_s(observation) / self._scenario.dt_s).astype(np.intp)
+        steps = np.rint(layout.scalar(observation, "time_left") * layout.period_s / self._dt_s).astype(np.intp)
         steps = np.clip(steps, 0, self._offsets.shape[1] - 1)
         offset = self._offsets[phase, steps]
         return Tracking(
@@ -79,54 +83,43 @@ class Guidance:
             desired=reference + offset,
             residual=reference @ self._reference_residual.T - self._delta + self._residuals[phase, steps],
             phase=phase,
-            steps_to_arrival=steps,
+            steps_left=steps,
+            in_hold=layout.scalar(observation, "in_hold") > 0.5,
         )
 
 
-def longest_transfer(scenario: Scenario) -> int:
-    """Steps of the longest transfer."""
-    return max(leg.arrival - leg.start for leg in legs(scenario))
-
-
-def nominal_start(scenario: Scenario, leg: Leg) -> Array:
-    """Where a leg's transfer should begin (6,): at the previous phase's reference, or at the scenario's start."""
-    if leg.index == 0:
-        return scenario.start.formation.state(scenario.orbit)
-    return leg_reference(scenario, legs(scenario)[leg.index - 1], np.array(leg.start))
-
-
 def _offsets(scenario: Scenario, guide: Guide) -> Array:
-    """Desired minus reference state (phases, steps to arrival, 6)."""
-    offsets = np.zeros((len(scenario.phases), longest_transfer(scenario) + 1, 6))
+    """Desired minus reference state (phases, steps left, 6)."""
+    offsets = np.zeros((len(scenario.phases), longest_phase(scenario) + 1, 6))
     for leg in legs(scenario):
-        steps = np.arange(leg.start, leg.arrival)
-        if len(steps):
-            path = desired_path(scenario, leg, guide)[:-1]
-            offsets[leg.index, leg.arrival - steps] = path - leg_reference(scenario, leg, steps)
+        path = desired_path(scenario, leg, guide)
+        steps = leg.start + np.arange(len(path))
+        offsets[leg.index, leg.end - steps] = path - leg_reference(scenario, leg, steps)
     return offsets
 
 
 def desired_path(scenario: Scenario, leg: Leg, guide: Guide) -> Array:
-    """Desired states (steps + 1, 6) of a leg's transfer, from its start to its arrival."""
+    """Desired states of a phase from its beginning on; where they end, the reference takes over."""
+    if leg.arrival == leg.start and guide != "least_cost":
+        return transfer_reference(scenario, leg)
     return PATHS[guide](scenario, leg)
 
 
-def reference_path(scenario: Scenario, leg: Leg) -> Array:
-    """The reference itself, states (steps + 1, 6)."""
-    return leg_reference(scenario, leg, np.arange(leg.start, leg.arrival + 1))
-
-
 def straight_line(scenario: Scenario, leg: Leg) -> Array:
-    """The straight line in LVLH of a leg's transfer, at constant speed (Ma 2009, section 3.2.2).
+    """The straight line in LVLH of a transfer, at constant speed (Ma 2009, section 3.2.2).
 
     Returns:
-        States (steps + 1, 6) from the transfer's start to its arrival; the velocity is the line's.
+        States (steps + 1, 6) from the beginning to the arrival, where the reference takes over; the velocity before is
+        the line's.
     """
-    start, goal = nominal_start(scenario, leg)[:3], leg_reference(scenario, leg, np.array(leg.arrival))[:3]
+    goal = leg_reference(scenario, leg, np.array(leg.arrival))
+    start, end = nominal_start(scenario, leg)[:3], goal[:3]
     steps = leg.arrival - leg.start
     share = np.linspace(0.0, 1.0, steps + 1)[:, None]
-    velocity = np.broadcast_to((goal - start) / (steps * scenario.dt_s), (steps + 1, 3))
-    return np.hstack([start + share * (goal - start), velocity])
+    velocity = np.broadcast_to((end - start) / (steps * scenario.dt_s), (steps + 1, 3))
+    line = np.hstack([start + share * (end - start), velocity])
+    line[-1] = goal
+    return line
 
 
 @lru_cache(maxsize=64)
@@ -134,19 +127,28 @@ def least_fuel_path(scenario: Scenario, leg: Leg) -> Array:
     """The path of few burns from the nominal start to the arrival by the filter's model, states (steps + 1, 6)."""
     model = scenario.filter_model()
     n = scenario.orbit.mean_motion_rad_s
-    reference = reference_path(scenario, leg)
-    start = nominal_start(scenario, leg) - reference[0]
+    start = start_error(scenario, leg)
     R = np.tile(np.eye(3) / n**4, (leg.arrival - leg.start, 1, 1))
     terminal = _ARRIVAL_WEIGHT * np.diag([1, 1, 1, n**-2, n**-2, n**-2])
     limit = 0.9 * scenario.spacecraft.max_accel_m_s2
     gains = least_fuel_gains(model.Phi, model.Gamma, R, terminal, start, limit, rounds=30, floor=1e-3)
-    path = reference + closed_loop(model.Phi, model.Gamma, gains, start)[0]
+    path = transfer_reference(scenario, leg) + closed_loop(model.Phi, model.Gamma, gains, start)[0]
+    path[-1] = leg_reference(scenario, leg, np.array(leg.arrival))
     path.setflags(write=False)
     return path
 
 
+def least_cost_path(scenario: Scenario, leg: Leg) -> Array:
+    """The mean path of the regulator of least expected cost, states (steps + 1, 6) over the whole phase."""
+    model = scenario.filter_model()
+    gains = expected_cost_gains(scenario)[leg.index]
+    reference = leg_reference(scenario, leg, np.arange(leg.start, leg.end + 1))
+    return reference + closed_loop(model.Phi, model.Gamma, gains, start_error(scenario, leg))[0]
+
+
 PATHS: Final[dict[str, Callable[[Scenario, Leg], Array]]] = {
-    "automatic": reference_path,
+    "automatic": transfer_reference,
     "straight_line": straight_line,
     "least_fuel": least_fuel_path,
+    "least_cost": least_cost_path,
 }

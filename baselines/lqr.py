@@ -1,19 +1,38 @@
-"""Linear quadratic regulator of the error state, with weights of their own for transfer and hold."""
+"""Linear quadratic regulator of the error state."""
 
 from functools import lru_cache
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, Strict
+from pydantic import Field, Strict, model_validator
 
-from baselines.guidance import Guidance, Guide, desired_path, longest_transfer, nominal_start
+from baselines.expected_cost import expected_cost_gains
+from baselines.guidance import Guidance, Guide, desired_path
 from baselines.policy import AccelerationPolicy, Observations
 from baselines.riccati import least_fuel_gains, stationary_gain
+from baselines.timeline import longest_phase, nominal_start
 from baselines.weights import Weights
 from formation_env.dynamics.base import Array
 from formation_env.scenario import Scenario
 from formation_env.schedule import Leg, legs
 from formation_env.settings import Flag, Positive, settings
+
+Rounds = Annotated[int, Strict(), Field(ge=0, le=100)]
+
+
+@settings
+class ExpectedCostSettings:
+    """How the gains of least expected cost are found, see `baselines.expected_cost`.
+
+    Attributes:
+        rounds: how often the weights are renewed.
+        floor: smallest thrust that is told from none, in units of max_accel_m_s2.
+        price_scale: factor of the scenario's price of errors.
+    """
+
+    rounds: Rounds = 30
+    floor: Positive = 3e-4
+    price_scale: Positive = 1.0
 
 
 @settings
@@ -39,16 +58,26 @@ class LQRSettings:
     """Gains of `lqr`.
 
     Attributes:
-        guidance: the desired path of transfers, see `baselines.guidance`.
+        design: `expected_cost`: a gain for each step, from the scenario's own cost; `weights`: from `hold` and `transfer`.
+        guidance: the desired path, see `baselines.guidance`; `expected_cost` finds the way by itself.
         feedforward: whether the thrust that the desired path itself takes is added.
+        expected_cost: for that design.
         hold: weights in hold.
         transfer: how transfers are flown.
     """
 
+    design: Literal["expected_cost", "weights"] = "expected_cost"
     guidance: Guide = "automatic"
     feedforward: Flag = True
+    expected_cost: ExpectedCostSettings = ExpectedCostSettings()
     hold: Weights = Weights(velocity_s2=(1e5, 1e5, 1e5), control_s2=(3e5, 3e5, 3e5))
     transfer: TransferSettings = TransferSettings()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.design == "expected_cost" and self.guidance != "automatic":
+            raise ValueError(f"guidance: must be automatic with design expected_cost, got {self.guidance!r}")
+        return self
 
 
 class LQR(AccelerationPolicy):
@@ -66,24 +95,35 @@ class LQR(AccelerationPolicy):
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
         now = self._guidance.track(observation)
-        K = self.K[now.phase, now.steps_to_arrival]
-        feedback = -(K @ now.error[..., None])[..., 0]
+        feedback = -(self.K[now.phase, now.steps_left] @ now.error[..., None])[..., 0]
         acceleration: Array = feedback + now.residual @ self._to_accel.T
         return acceleration
 
 
 def gain_table(scenario: Scenario, gains: LQRSettings) -> Array:
-    """Gains (phases, steps to arrival, 3, 6); those at the arrival, 0 steps to go, hold from then on."""
-    model, hold, transfer = scenario.filter_model(), gains.hold, gains.transfer
-    table = np.empty((len(scenario.phases), longest_transfer(scenario) + 1, 3, 6))
-    on_the_way = transfer.weights if transfer.horizon == "infinite" else hold
-    table[:] = stationary_gain(model.Phi, model.Gamma, on_the_way.Q(), on_the_way.R(scenario.orbit))
-    table[:, 0] = stationary_gain(model.Phi, model.Gamma, hold.Q(), hold.R(scenario.orbit))
-    if transfer.horizon == "finite":
-        for leg in legs(scenario):
-            steps = leg.arrival - leg.start
-            table[leg.index, steps:0:-1] = transfer_gains(scenario, leg, gains.guidance, transfer)
+    """Gains (phases, steps left, 3, 6)."""
+    table = np.zeros((len(scenario.phases), longest_phase(scenario) + 1, 3, 6))
+    for leg in legs(scenario):
+        table[leg.index, leg.end - leg.start : 0 : -1] = phase_gains(scenario, leg, gains)
     return table
+
+
+def phase_gains(scenario: Scenario, leg: Leg, gains: LQRSettings) -> Array:
+    """Gains (steps, 3, 6) of a phase, from its beginning on."""
+    if gains.design == "expected_cost":
+        wanted = gains.expected_cost
+        return expected_cost_gains(scenario, wanted.rounds, wanted.floor, wanted.price_scale)[leg.index]
+    hold = np.tile(_stationary(scenario, gains.hold), (leg.end - leg.arrival, 1, 1))
+    if gains.transfer.horizon == "infinite":
+        transfer = np.tile(_stationary(scenario, gains.transfer.weights), (leg.arrival - leg.start, 1, 1))
+    else:
+        transfer = transfer_gains(scenario, leg, gains.guidance, gains.transfer)
+    return np.concatenate([transfer, hold])
+
+
+def _stationary(scenario: Scenario, weights: Weights) -> Array:
+    model = scenario.filter_model()
+    return stationary_gain(model.Phi, model.Gamma, weights.Q(), weights.R(scenario.orbit))
 
 
 @lru_cache(maxsize=64)

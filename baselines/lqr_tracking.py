@@ -17,12 +17,12 @@ class LQRTrackingSettings:
     """Gains of `lqr_tracking`.
 
     Attributes:
-        guidance: the desired path of transfers, see `baselines.guidance`.
+        guidance: the desired path, see `baselines.guidance`.
         hold: weights in hold.
         transfer: weights in transfer.
     """
 
-    guidance: Guide = "straight_line"
+    guidance: Guide = "least_cost"
     hold: Weights = Weights(control_s2=(0.5, 0.5, 0.5))
     transfer: Weights = Weights(control_s2=(0.5, 0.5, 0.5))
 
@@ -45,7 +45,7 @@ class LQRTracking(AccelerationPolicy):
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
         now = self._guidance.track(observation)
-        index = (now.steps_to_arrival > 0).astype(np.intp)
+        index = 1 - now.in_hold.astype(np.intp)
         # -K x + K_d y_d with x = y_d + e
         surplus = self.K_desired[index] - self.K[index]
         return (surplus @ now.desired[..., None] - self.K[index] @ now.error[..., None])[..., 0]

@@ -16,13 +16,13 @@ class SMCSettings:
     """Gains of `smc`.
 
     Attributes:
-        guidance: the desired path of transfers, see `baselines.guidance`.
+        guidance: the desired path, see `baselines.guidance`.
         surface: the sliding surface s = Ce e.
         reaching: how s comes to zero.
         boundary_m: thickness Delta of the boundary layer, within which sgn s is replaced by s / Delta, m; 0 is none.
     """
 
-    guidance: Guide = "least_fuel"
+    guidance: Guide = "least_cost"
     surface: AnySurface = PlacedSurface()
     reaching: AnyReaching = ExponentialReaching()
     boundary_m: NonNegative = 50.0

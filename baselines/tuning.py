@@ -54,14 +54,7 @@ def _regulator(section: str) -> tuple[Knob, ...]:
 
 
 STAGES: Final[dict[str, tuple[tuple[Knob, ...], ...]]] = {
-    "lqr": (
-        _regulator("hold"),
-        (
-            Knob(tuple(f"transfer.weights.velocity_s2.{axis}" for axis in range(3)), 4, 8),
-            Knob(tuple(f"transfer.weights.control_s2.{axis}" for axis in range(3)), -4, 4),
-            Knob(("transfer.floor",), -3.5, -1),
-        ),
-    ),
+    "lqr": ((Knob(("expected_cost.floor",), -5, -2), Knob(("expected_cost.price_scale",), -0.5, 0.5)),),
     "lqr_tracking": (_regulator("transfer"), _regulator("hold")),
     "smc": (
         (

@@ -53,9 +53,14 @@ def evaluate(
 
     Returns:
         One line per episode: `seed` and the columns of `formation_env.metrics.METRICS`.
+
+    Raises:
+        ValueError: no seeds.
     """
     scenario = scenario_of(env_id_or_scenario)
     seeds = [int(seed) for seed in seeds]
+    if not seeds:
+        raise ValueError("evaluate: seeds must not be empty")
     chunks = [seeds[i : i + MAX_ROWS] for i in range(0, len(seeds), MAX_ROWS)]
     return pd.concat([_fly(policy, scenario, chunk, progress) for chunk in chunks], ignore_index=True)
 

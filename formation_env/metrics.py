@@ -69,7 +69,7 @@ def _max_error(sums: Sums) -> Array:
 
 
 def _arrival_error(sums: Sums) -> Array:
-    """Position error at the end of the transfer, m; the mean if there are several."""
+    """Position error at the end of the transfer, m; the mean if there are several, at the start if there is none."""
     return sums.arrival_error_m
 
 

@@ -25,7 +25,7 @@ FIELDS: Final = {
     "price_left": 1,  # sum of the later prices
     "counts": 1,  # 1 if the step to this instant belongs to a hold
     "counts_left": 1,  # later steps that do
-    "arrives": 1,  # 1 / number of arrivals if this instant is one
+    "arrives": 1,  # 1 / number of transfers if one ends at this instant; without any, the start counts
 }
 
 
@@ -86,6 +86,8 @@ def build_schedule(scenario: Scenario) -> Array:
     for leg in legs(scenario):
         _fill_plan(table, scenario, leg)
         _fill_scores(table, scenario, leg)
+    arrivals = [leg.arrival for leg in legs(scenario) if leg.arrival > leg.start] or [0]
+    _column(table, "arrives")[arrivals] = 1 / len(arrivals)
     times_s: Array = scenario.dt_s * np.arange(len(table), dtype=float)
     _column(table, "link_closed")[:] = scenario.dropout.closed(times_s)
     for name, left in (("error_price", "price_left"), ("counts", "counts_left")):
@@ -146,4 +148,3 @@ def _fill_scores(table: Array, scenario: Scenario, leg: Leg) -> None:
     _columns(table, "scored_position")[judged] = leg_reference(scenario, leg, ends)[:, :3]
     _column(table, "error_price")[judged] = np.where(ends > 0, weight, 0) * scenario.dt_s / scenario.hold_s
     _column(table, "counts")[judged] = held
-    _column(table, "arrives")[leg.arrival] = 1 / len(scenario.phases)

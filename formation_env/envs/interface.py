@@ -49,7 +49,7 @@ def read_start(options: Mapping[str, Any] | None, simulation: Simulation) -> Arr
         ValueError: an unknown option, or a start of wrong shape, not finite, or beyond the limits.
     """
     num_rows, limits = simulation.num_rows, simulation.scenario.limits
-    unknown = set(options or {}) - {START_OPTION, "reset_mask"}
+    unknown = set(options or {}) - {START_OPTION}
     if unknown:
         raise ValueError(f"reset options: unknown {sorted(unknown)}; known: {START_OPTION}")
     if not options or START_OPTION not in options:

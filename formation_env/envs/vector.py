@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import gymnasium
 import numpy as np
@@ -18,6 +18,8 @@ from formation_env.scenario import Scenario, load_scenario
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
+
+MASK_OPTION: Final = "reset_mask"
 
 
 class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
@@ -73,19 +75,21 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         Raises:
             ValueError: wrong options or number of seeds.
         """
-        starts = interface.read_start(options, self.simulation)
-        chosen = self._mask(options)
+        others = dict(options or {})
+        chosen = self._mask(others.pop(MASK_OPTION, None))
+        starts = interface.read_start(others, self.simulation)
         self._seed(seed, chosen)
         self.simulation.reset(chosen, self._observations, starts)
         infos = self._infos()
         return self._observations.copy(), infos if chosen.all() else _only(infos, chosen)
 
-    def _mask(self, options: dict[str, Any] | None) -> Flags:
-        mask = np.asarray((options or {}).get("reset_mask", np.ones(self.num_envs, bool)))
+    def _mask(self, given: Any) -> Flags:
+        """The rows to reset: all, or those given."""
+        mask = np.ones(self.num_envs, bool) if given is None else np.asarray(given)
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
-            raise ValueError(f"reset_mask: must be bool ({self.num_envs},), got {mask.dtype} {mask.shape}")
+            raise ValueError(f"{MASK_OPTION}: must be bool ({self.num_envs},), got {mask.dtype} {mask.shape}")
         if not self._keyed and not mask.all():
-            raise ValueError("reset_mask: the first reset must be of all rows")
+            raise ValueError(f"{MASK_OPTION}: the first reset must be of all rows")
         return mask
 
     def _seed(self, seed: int | Sequence[int | None] | None, chosen: Flags) -> None:
@@ -97,9 +101,10 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             seeds = [None] * self.num_envs if seed is None else seed
         if len(seeds) != self.num_envs:
             raise ValueError(f"seed: a list must have {self.num_envs} elements, got {len(seeds)}")
-        for row in np.flatnonzero(chosen).tolist():
-            if seeds[row] is not None or not self._keyed:
-                self.simulation.seed(row, gymnasium.utils.seeding.np_random(seeds[row])[0])
+        rows = [row for row in np.flatnonzero(chosen).tolist() if seeds[row] is not None or not self._keyed]
+        generators = [gymnasium.utils.seeding.np_random(seeds[row])[0] for row in rows]
+        for row, generator in zip(rows, generators, strict=True):
+            self.simulation.seed(row, generator)
         self._keyed = True
 
     def step(self, actions: Any) -> tuple[Observations, NDArray[np.float64], Flags, Flags, dict[str, Any]]:
@@ -122,19 +127,19 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         terminations = simulation.result(f.TERMINATED) > 0.5
         truncations = simulation.result(f.TRUNCATED) > 0.5
         ended = terminations | truncations
-        finals = self._begin_next(ended, self._observations) if ended.any() else {}
+        finals = self._begin_next(ended) if ended.any() else {}
         return self._observations.copy(), rewards, terminations, truncations, {**self._infos(), **finals}
 
-    def _begin_next(self, ended: Flags, observations: Observations) -> dict[str, Any]:
-        """Reset the rows that ended, in place; what they ended with, in Gymnasium's form."""
+    def _begin_next(self, ended: Flags) -> dict[str, Any]:
+        """Reset the rows that ended; what they ended with, in Gymnasium's form."""
         final_info = self._infos()
         totals: dict[str, Any] = dict(episode_metrics(self.simulation))
         final_info[interface.TOTALS] = totals | {f"_{name}": ended for name in totals}
         final_info[f"_{interface.TOTALS}"] = ended
         final_obs = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(ended):
-            final_obs[row] = observations[row].copy()
-        self.simulation.reset(ended, observations)
+            final_obs[row] = self._observations[row].copy()
+        self.simulation.reset(ended, self._observations)
         return {
             "final_obs": final_obs,
             "_final_obs": ended,

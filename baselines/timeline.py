@@ -1,0 +1,29 @@
+"""Phases on the clock, as the policies look things up: by phase and by steps left to its end."""
+
+import numpy as np
+
+from formation_env.dynamics.base import Array
+from formation_env.scenario import Scenario
+from formation_env.schedule import Leg, leg_reference, legs
+
+
+def longest_phase(scenario: Scenario) -> int:
+    """Steps of the longest phase, transfer and hold."""
+    return max(leg.end - leg.start for leg in legs(scenario))
+
+
+def nominal_start(scenario: Scenario, leg: Leg) -> Array:
+    """Where a phase should begin (6,): at the reference of the one before, or at the scenario's start."""
+    if leg.index == 0:
+        return scenario.start.formation.state(scenario.orbit)
+    return leg_reference(scenario, legs(scenario)[leg.index - 1], np.array(leg.start))
+
+
+def start_error(scenario: Scenario, leg: Leg) -> Array:
+    """Nominal error (6,) from the reference at a phase's beginning."""
+    return nominal_start(scenario, leg) - leg_reference(scenario, leg, np.array(leg.start))
+
+
+def transfer_reference(scenario: Scenario, leg: Leg) -> Array:
+    """Reference states (steps + 1, 6) from a phase's beginning to its arrival."""
+    return leg_reference(scenario, leg, np.arange(leg.start, leg.arrival + 1))
