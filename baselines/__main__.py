@@ -3,12 +3,13 @@
 import typer
 
 from baselines.commands import report
+from baselines.picture import render
 from baselines.tuning import tune
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False)
-app.callback()(lambda: None)  # so that a single command keeps its name
 app.command()(tune)
 app.command()(report)
+app.command()(render)
 
 if __name__ == "__main__":
     app()

@@ -1,7 +1,7 @@
 """Gains of every step of a phase from the scenario's own cost, by iteratively reweighted LQG.
 
-The return counts |u| and |e|, not their squares. With weights 1 / rms |u_k| and price / rms |e_k| of the round before, a
-quadratic cost has the same sum, and its minimum moves towards the least E|u| and E|e| (Daubechies et al. 2010,
+The return counts |u| and |e|, not their squares. With weights 1 / rms |u_k| and price / rms |e_k| of the round before,
+a quadratic cost has the same sum, and its minimum moves towards the least E|u| and E|e| (Daubechies et al. 2010,
 doi 10.1002/cpa.20303, for sums without expectation). The rms values follow from the nominal start, its spread, and the
 noises, as if no measurement were lost.
 

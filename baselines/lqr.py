@@ -58,7 +58,8 @@ class LQRSettings:
     """Gains of `lqr`.
 
     Attributes:
-        design: `expected_cost`: a gain for each step, from the scenario's own cost; `weights`: from `hold` and `transfer`.
+        design: `expected_cost`: a gain for each step, from the scenario's own cost; `weights`: from `hold` and
+            `transfer`.
         guidance: the desired path, see `baselines.guidance`; `expected_cost` finds the way by itself.
         feedforward: whether the thrust that the desired path itself takes is added.
         expected_cost: for that design.

@@ -10,9 +10,10 @@ from scipy.optimize import linprog
 from scipy.sparse import eye, kron, vstack
 
 from baselines import make_policy
-from baselines.guidance import least_fuel_path, nominal_start
+from baselines.guidance import least_fuel_path
 from baselines.lqr_tracking import tracking_gains
 from baselines.riccati import continuous_gain, finite_horizon_gains, stationary_gain
+from baselines.timeline import nominal_start
 from baselines.weights import Weights
 from formation_env import load_scenario
 from formation_env.dynamics import HCW, ModifiedHCW, transition_matrix
@@ -146,6 +147,6 @@ def test_renewed_weights_save_fuel_in_flight() -> None:
 
     flown: dict[int, Array] = {}
     for rounds in (0, 30):
-        policy = make_policy("lqr", "initialization", {"transfer": {"rounds": rounds}})
+        policy = make_policy("lqr", "initialization", {"design": "weights", "transfer": {"rounds": rounds}})
         flown[rounds] = evaluate(policy, "initialization", range(20))["delta_v_m_s"].to_numpy()
     assert flown[0].mean() > 1.3 * flown[30].mean()

@@ -51,7 +51,7 @@ def test_lqg_covariance_is_the_lyapunov_equations() -> None:
     The rows are independent; with 12 + 3 values a correct program fails with probability 1e-4.
     """
     scenario = linear_regime()
-    policy, rows = make_policy("lqr", scenario, {"hold": HOLD}), 512
+    policy, rows = make_policy("lqr", scenario, {"design": "weights", "hold": HOLD}), 512
     env = FormationVectorEnv(rows, scenario)
     reference = scenario.phases[0].formation.reference(scenario.dt_s * np.arange(301), scenario.orbit)
     observation, _ = env.reset(seed=0)
@@ -64,7 +64,7 @@ def test_lqg_covariance_is_the_lyapunov_equations() -> None:
         if step > 150:  # the loop's slowest time constant is 300 s, 10 steps
             squares.append(np.hstack([error, missed, info["accel_m_s2"]]) ** 2)
     means = np.mean(squares, axis=0)
-    K = policy.K[0, 0]
+    K = policy.K[0, 1]
     joint = joint_covariance(scenario, K)
     seen = np.hstack([-K, K])  # u = -K (e - x~)
     expected = np.concatenate([np.diag(joint), np.diag(seen @ joint @ seen.T)])

@@ -59,6 +59,7 @@ def gain(policy: Any, scenario: Scenario, phase: int) -> Array:
     observation[:, SLICES["error"]] = np.vstack([errors, -errors]) / layout.state_scale
     observation[:, SLICES["phase"]] = phase / len(scenario.phases)
     observation[:, SLICES["in_hold"]] = 1
+    observation[:, SLICES["time_left"]] = scenario.phases[phase].hold_periods / 2
     accelerations = policy.acceleration(observation)
     return ((accelerations[:6] - accelerations[6:]) / (2 * errors.diagonal()[:, None])).T
 
@@ -124,6 +125,7 @@ FAULTS = {
     "lqr:\n  hold: {control_s2: [1, -1, 1]}\n": ("lqr", "hold.control_s2.1"),
     "lqr:\n  guidence: automatic\n": ("lqr", "guidence: unknown key; did you mean 'guidance'?"),
     "lqr:\n  guidance: curved\n": ("lqr", "guidance"),
+    "lqr:\n  guidance: straight_line\n": ("lqr", "guidance: must be automatic with design expected_cost"),
     "smc:\n  reaching: {kind: fast}\n": ("smc", "reaching.kind"),
     "smc:\n  reaching: {kind: power, alpha: 2}\n": ("smc", "reaching.alpha"),
     "smc:\n  surface: {kind: placed, decay_per_s: '1e-3'}\n": ("smc", "surface.decay_per_s"),

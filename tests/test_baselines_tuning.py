@@ -37,8 +37,8 @@ def test_knobs_turn_the_gains_that_they_name(name: str) -> None:
 
 def test_transfer_stages_are_for_transfers() -> None:
     """Keeping has no transfer to search for."""
-    assert len(stages("lqr", load_scenario("keeping"))) == 1
-    assert len(stages("lqr", load_scenario("mission"))) == 2
+    assert len(stages("lqr_tracking", load_scenario("keeping"))) == 1
+    assert len(stages("lqr_tracking", load_scenario("mission"))) == 2
 
 
 def test_command_writes_gains_that_load(tmp_path: Path) -> None:

@@ -17,10 +17,10 @@ from baselines.__main__ import app
 from baselines.floors import Random, RandomSettings, Zero, ZeroSettings
 from baselines.report import FILES, style, write_report
 from baselines.report.flight_figures import outage_path
-from baselines.report.output import write_files
 from baselines.report.results import numbers, significant
 from baselines.report.scales import Scale, round_values
 from formation_env import ConfigError, Scenario, load_scenario
+from formation_env.files import write_texts
 from formation_env.metrics import METRICS
 from formation_env.settings import build
 
@@ -156,7 +156,7 @@ def test_files_are_written_all_or_none(tmp_path: Path, monkeypatch: pytest.Monke
 
     monkeypatch.setattr(Path, "write_text", failing)
     with pytest.raises(type(failure)):
-        write_files(tmp_path, {"a.csv": "new", "b.csv": "new"})
+        write_texts(tmp_path, {"a.csv": "new", "b.csv": "new"})
     assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
     assert (tmp_path / "a.csv").read_text() == "old"
 

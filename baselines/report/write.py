@@ -5,9 +5,9 @@ from pathlib import Path
 
 from baselines.report.document import document, to_json
 from baselines.report.flights import Environment, PolicyFactory, fly
-from baselines.report.output import write_files
 from baselines.report.page import render
 from baselines.report.results import analyse, episode_table, summary_table
+from formation_env.files import write_texts
 from formation_env.seeds import seeds as seeds_of
 
 FILES = ("episodes.csv", "summary.csv", "report.json", "report.html")
@@ -42,5 +42,5 @@ def write_report(
         to_json(data),
         render(results, data),
     )
-    write_files(out, dict(zip(FILES, contents, strict=True)))
+    write_texts(out, dict(zip(FILES, contents, strict=True)))
     return out / "report.html"

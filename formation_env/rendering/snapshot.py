@@ -7,6 +7,7 @@ from matplotlib.image import imsave
 
 from formation_env.envs.single import FormationEnv
 from formation_env.evaluation import Policy, scenario_of
+from formation_env.files import replacing
 from formation_env.rendering.scene import DPI
 from formation_env.scenario import Scenario
 
@@ -48,7 +49,6 @@ def save_frame(
         if terminated or truncated:
             break
     path = Path(out)
-    part = path.with_name(f".{path.name}.part")
-    imsave(part, frame, format="png", dpi=DPI)
-    part.replace(path)
+    with replacing(path) as temporary:
+        imsave(temporary, frame, format="png", dpi=DPI)
     return path
