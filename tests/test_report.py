@@ -150,7 +150,7 @@ def test_files_are_written_all_or_none(tmp_path: Path, monkeypatch: pytest.Monke
     write_text = Path.write_text
 
     def failing(self: Path, data: str, encoding: str | None = None, newline: str | None = None) -> int:
-        if "b.csv" in self.name:
+        if self.name.startswith(".b."):
             raise failure
         return write_text(self, data, encoding=encoding, newline=newline)
 
