@@ -184,8 +184,10 @@ def test_ctrl_c_ends_in_one_line_and_leaves_nothing(tmp_path: Path) -> None:
     arguments = ["report", "--episodes", "4000", "--env", "mission", "--policy", "zero", "--out", str(out)]
     process = subprocess.Popen([sys.executable, "-m", "baselines", *arguments], stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
-    while process.stderr.read(1) != "%":  # the progress bar is there: the flights have begun
-        assert process.poll() is None
+    shown = ""
+    while not re.search(r"[1-9]%", shown):  # the kernel is compiled and the flights have begun
+        shown += process.stderr.read(1)
+        assert process.poll() is None, shown
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
