@@ -89,13 +89,18 @@ def spread(model: DiscreteModel, gains: Array, start: Array, first: Array, known
     second = np.outer(start, start) + first
     control, error, peak = np.zeros(len(gains)), np.zeros(len(gains) + 1), np.zeros(len(gains))
     for step, K in enumerate(gains):
-        squares = np.diag(K @ second @ K.T)
+        squares = ((K @ second) * K).sum(axis=1)  # the diagonal of K X K'
         control[step], peak[step] = np.sqrt(squares.sum()), np.sqrt(squares.max())
-        error[step] = np.sqrt(np.trace((second + known.missed[step])[:3, :3]))
+        error[step] = _rms_position(second, known.missed[step])
         loop = model.Phi - model.Gamma @ K
         second = loop @ second @ loop.T + known.learned[step + 1]
-    error[-1] = np.sqrt(np.trace((second + known.missed[-1])[:3, :3]))
+    error[-1] = _rms_position(second, known.missed[-1])
     return Spread(control, error, peak, second)
+
+
+def _rms_position(estimated: Array, missed: Array) -> float:
+    """Root mean square of the true position error, m, from the moments of its estimate and of the estimate's error."""
+    return float(np.sqrt((estimated.diagonal() + missed.diagonal())[:3].sum()))
 
 
 @lru_cache(maxsize=32)

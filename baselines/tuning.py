@@ -4,7 +4,7 @@ What is searched are decades of gains, in stages: gains of a later stage matter 
 candidates of a generation fly the same episodes side by side, so they differ by their gains alone.
 """
 
-import dataclasses
+import copy
 import os
 import re
 from collections.abc import Callable, Sequence
@@ -24,7 +24,7 @@ from formation_env.dynamics.base import Array
 from formation_env.evaluation import Policy, evaluate
 from formation_env.scenario import Scenario, config_folder, load_scenario, scenario_names
 from formation_env.seeds import seeds
-from formation_env.settings import ConfigError
+from formation_env.settings import ConfigError, load_yaml
 
 
 @dataclass(frozen=True)
@@ -90,20 +90,17 @@ def costs(policies: Sequence[Policy], scenario: Scenario, episode_seeds: Sequenc
     return per_policy
 
 
-def plain(gains: Any) -> dict[str, Any]:
-    """A settings object as YAML would give it."""
-    return {key: _lists(value) for key, value in dataclasses.asdict(gains).items()}
-
-
-def _lists(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _lists(inner) for key, inner in value.items()}
-    return [*value] if isinstance(value, tuple) else value
+def first_gains(policy: str) -> dict[str, Any]:
+    """What a search begins with: the policy's section of default.yaml, which has every knob."""
+    path = config_folder("baselines") / "default.yaml"
+    read_gains(policy, path)  # refuses what is wrong in it
+    section: dict[str, Any] = load_yaml(path)[policy]
+    return section
 
 
 def turn(gains: dict[str, Any], knobs: Sequence[Knob], decades: NDArray[np.float64]) -> dict[str, Any]:
     """Gains with the knobs at 10^decades, to three digits."""
-    turned: dict[str, Any] = _lists(gains | {key: _copy(value) for key, value in gains.items()})
+    turned = copy.deepcopy(gains)
     for knob, decade in zip(knobs, decades, strict=True):
         for key in knob.keys:
             *parents, last = key.split(".")
@@ -112,12 +109,6 @@ def turn(gains: dict[str, Any], knobs: Sequence[Knob], decades: NDArray[np.float
                 target = target[part]
             target[int(last) if last.isdigit() else last] = float(f"{10.0**decade:.3g}")
     return turned
-
-
-def _copy(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {key: _copy(inner) for key, inner in value.items()}
-    return [*value] if isinstance(value, list) else value
 
 
 def read(gains: dict[str, Any], knob: Knob) -> float:
@@ -149,7 +140,7 @@ def search(
         progress: called after each.
     """
 
-    def cost(decades: Array) -> Array:
+    def cost(decades: Any, /) -> Any:
         candidates = [make_policy(name, scenario, turn(gains, knobs, column)) for column in decades.T]
         return costs(candidates, scenario, episode_seeds)
 
@@ -198,7 +189,7 @@ def _tune_one(policy: str, name: str, episodes: int, generations: int, folder: P
     """Search, write, and give the cost, m/s."""
     scenario, episode_seeds = load_scenario(name), seeds("tuning", episodes)
     path = folder / f"{Path(name).stem}.yaml"
-    gains, cost = plain(read_gains(policy, config_folder("baselines") / "default.yaml")), np.inf
+    gains, cost = first_gains(policy), np.inf
     todo = stages(policy, scenario)
     with typer.progressbar(length=generations * len(todo), label=f"{name} {policy}") as bar:
         for knobs in todo:
@@ -216,7 +207,7 @@ def section(policy: str, gains: dict[str, Any], comment: str) -> str:
 
     yaml, stream = YAML(typ="safe", pure=True), StringIO()
     yaml.default_flow_style, yaml.width = None, 120
-    yaml.sort_base_mapping_type_on_output = False
+    yaml.width, yaml.sort_base_mapping_type_on_output = 120, False  # type: ignore[assignment]
     yaml.dump({policy: gains}, stream)
     return "".join(f"# {line}\n" for line in comment.splitlines()) + stream.getvalue()
 

@@ -8,9 +8,10 @@ from typer.testing import CliRunner
 
 from baselines.__main__ import app
 from baselines.registry import POLICIES, make_policy, read_gains
-from baselines.tuning import STAGES, SideBySide, costs, plain, read, replace_section, stages, turn
+from baselines.tuning import STAGES, SideBySide, costs, first_gains, read, replace_section, stages, turn
 from formation_env import load_scenario
 from formation_env.evaluation import evaluate
+from formation_env.settings import build
 
 
 def test_side_by_side_is_one_after_the_other() -> None:
@@ -25,14 +26,14 @@ def test_side_by_side_is_one_after_the_other() -> None:
 @pytest.mark.parametrize("name", STAGES)
 def test_knobs_turn_the_gains_that_they_name(name: str) -> None:
     """A knob read back stands where it was set, the settings accept it, and what it was set from has not changed."""
-    gains = plain(POLICIES[name].Settings())
+    gains = first_gains(name)
     for knobs in STAGES[name]:
         decades = np.array([(knob.low + knob.high) / 2 for knob in knobs])
         turned = turn(gains, knobs, decades)
-        POLICIES[name].Settings(**turned)
+        build(POLICIES[name].Settings, turned, "turned")
         # three digits
         np.testing.assert_allclose([read(turned, knob) for knob in knobs], decades, atol=2e-3)
-    assert gains == plain(POLICIES[name].Settings())
+    assert gains == first_gains(name)
 
 
 def test_transfer_stages_are_for_transfers() -> None:
