@@ -59,5 +59,5 @@ def tracking_gains(scenario: Scenario, weights: Weights) -> tuple[Array, Array]:
     K, P = continuous_gain(A, B, Q, weights.R(scenario.orbit))
     # R^-1 B' (P B R^-1 B' - A')^-1 Q, with R^-1 B' P = K
     g = np.linalg.solve(P @ B @ np.linalg.solve(weights.R(scenario.orbit), B.T) - A.T, Q)
-    K_desired: Array = np.linalg.solve(weights.R(scenario.orbit), B.T @ g)
+    K_desired = np.asarray(np.linalg.solve(weights.R(scenario.orbit), B.T @ g), np.float64)
     return K, K_desired
