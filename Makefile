@@ -20,7 +20,7 @@ INSTALL = $(PY) -m pip install --quiet -c constraints.txt -e
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-report: $(REPORT) ## Classical baselines over every scenario (EPISODES=100 OUT=reports/)
+report: $(REPORT) ## Classical baselines on the four environments (EPISODES=100 OUT=reports/)
 	$(PY) -m baselines report --episodes $(EPISODES) --out $(OUT)
 
 test: $(TEST) ## Run the tests (ARGS="-k kalman -n 0")

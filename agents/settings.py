@@ -115,16 +115,16 @@ class SACSettings:
         network: layers.
     """
 
-    rows: Count = 16
+    rows: Count = 64
     gradient_steps: Count = 8
-    batch_size: Count = 512
+    batch_size: Count = 256
     buffer_size: Count = 300_000
-    learning_starts: Count = 6_400
-    learning_rate: Positive = 7e-4
-    gamma: Probability = 0.99
-    tau: Share = 0.01
+    learning_starts: Count = 3_200
+    learning_rate: Positive = 1e-3
+    gamma: Probability = 0.98
+    tau: Share = 0.02
     entropy_init: Positive = 0.01
-    target_entropy: Real = -9.0
+    target_entropy: Real = -6.0
     reward_scale: Positive = 10.0
     action_scale: Share = 0.1
     network: Network = Network(activation="relu")

@@ -13,7 +13,9 @@ import numpy as np
 
 from formation_env.dynamics.base import Array
 from formation_env.jit import lane
+from formation_env.orbit import Orbit
 from formation_env.settings import NonNegative, Text, settings
+from formation_env.spacecraft import Spacecraft
 
 Symmetric2 = tuple[float, float, float]
 Symmetric4 = tuple[float, float, float, float, float, float, float, float, float, float]
@@ -45,6 +47,9 @@ class KalmanFilter:
         sigma_pos_m: 1-sigma of the measured position, m.
         sigma_vel_m_s: 1-sigma of the measured velocity, m/s.
         process_noise_m_s2: 1-sigma of the random acceleration of each axis, held over a step, m/s^2.
+        thrust_noise: 1-sigma of the relative error of the thrust's magnitude.
+        orbit: the leader's orbit.
+        spacecraft: the follower's drag (and the leader's, if the scenario has no other).
         initial_sigma_pos_m: 1-sigma of the first estimate's position, m.
         initial_sigma_vel_m_s: 1-sigma of the first estimate's velocity, m/s.
     """
@@ -53,6 +58,9 @@ class KalmanFilter:
     sigma_pos_m: NonNegative | None = None
     sigma_vel_m_s: NonNegative | None = None
     process_noise_m_s2: NonNegative | None = None
+    thrust_noise: NonNegative | None = None
+    orbit: Orbit | None = None
+    spacecraft: Spacecraft | None = None
     initial_sigma_pos_m: NonNegative | None = None
     initial_sigma_vel_m_s: NonNegative | None = None
 
@@ -120,6 +128,37 @@ def time_update_4(P: Symmetric4, Phi: tuple[float, ...], Q_noise: Symmetric4) ->
         _dot(c, d0, d1, d2, d3) + Q_noise[8],
         _dot(d, d0, d1, d2, d3) + Q_noise[9],
     )
+
+
+@lane
+def thrust_noise_update_4(P: Symmetric4, Gamma: tuple[float, ...], ax: float, ay: float, variance: float) -> Symmetric4:
+    """P + variance (Gamma a) (Gamma a)': the uncertainty of a thrust a whose magnitude has a relative error.
+
+    The same error acts on the cross-track axis. That correlation between the two parts of the state is left out.
+    """
+    p00, p01, p02, p03, p11, p12, p13, p22, p23, p33 = P
+    g0, g1 = Gamma[0] * ax + Gamma[1] * ay, Gamma[2] * ax + Gamma[3] * ay
+    g2, g3 = Gamma[4] * ax + Gamma[5] * ay, Gamma[6] * ax + Gamma[7] * ay
+    v0, v1, v2, v3 = variance * g0, variance * g1, variance * g2, variance * g3
+    return (
+        p00 + v0 * g0,
+        p01 + v0 * g1,
+        p02 + v0 * g2,
+        p03 + v0 * g3,
+        p11 + v1 * g1,
+        p12 + v1 * g2,
+        p13 + v1 * g3,
+        p22 + v2 * g2,
+        p23 + v2 * g3,
+        p33 + v3 * g3,
+    )
+
+
+@lane
+def thrust_noise_update_2(P: Symmetric2, Gamma: tuple[float, float], az: float, variance: float) -> Symmetric2:
+    """The same of the cross-track axis."""
+    g0, g1 = Gamma[0] * az, Gamma[1] * az
+    return P[0] + variance * g0 * g0, P[1] + variance * g0 * g1, P[2] + variance * g1 * g1
 
 
 @lane

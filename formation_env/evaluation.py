@@ -87,7 +87,7 @@ def _fly(policy: Policy, scenario: Scenario, seeds: list[int], progress: Callabl
 def bootstrap_interval(values: NDArray[np.float64], confidence: float = 0.95) -> tuple[float, float]:
     """Confidence interval of the mean of values (n,) by the bias-corrected bootstrap; the same data give the same."""
     values = np.asarray(values, float)
-    if len(values) < 2 or np.ptp(values) == 0:
+    if len(values) < 2 or np.ptp(values) <= 1e-12 * abs(values.mean()):
         return float(values.mean()), float(values.mean())
     result = stats.bootstrap((values,), np.mean, confidence_level=confidence, rng=np.random.default_rng(0))
     return float(result.confidence_interval.low), float(result.confidence_interval.high)

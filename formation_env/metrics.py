@@ -7,7 +7,6 @@ from typing import Final
 import numpy as np
 
 from formation_env.dynamics.base import Array
-from formation_env.jit import LANES
 from formation_env.kernel import tile as f
 from formation_env.kernel.simulation import Simulation
 
@@ -69,7 +68,10 @@ def _max_error(sums: Sums) -> Array:
 
 
 def _arrival_error(sums: Sums) -> Array:
-    """Position error at the end of the transfer, m; the mean if there are several, at the start if there is none."""
+    """Position error at the end of the transfer, m; the mean if there are several, at the start if there is none.
+
+    What an early end cut off counts as at the distance limit.
+    """
     return sums.arrival_error_m
 
 
@@ -109,19 +111,17 @@ METRICS: Final[dict[str, Callable[[Sums], Array]]] = {
 
 def episode_metrics(simulation: Simulation) -> dict[str, Array]:
     """Metrics of the rows' episodes up to now, each (num_rows,)."""
-    fields = simulation.state(f.SUM_REWARD, (f.STATE_FIELDS * LANES - f.SUM_REWARD) // LANES).T
-    reward, delta_v, error, square, max_error, arrival_error, tolerated, lost = fields
     sums = Sums(
         steps=simulation.state(f.STEP, 1)[:, 0],
-        reward=reward,
-        delta_v_m_s=delta_v,
-        error_m=error,
-        square_m2=square,
-        max_error_m=max_error,
-        arrival_error_m=arrival_error,
+        reward=simulation.state(f.SUM_REWARD, 1)[:, 0],
+        delta_v_m_s=simulation.state(f.SUM_DELTA_V, 1)[:, 0],
+        error_m=simulation.state(f.SUM_ERROR, 1)[:, 0],
+        square_m2=simulation.state(f.SUM_SQUARE, 1)[:, 0],
+        max_error_m=simulation.state(f.MAX_ERROR, 1)[:, 0],
+        arrival_error_m=simulation.state(f.ARRIVAL_ERROR, 1)[:, 0],
         final_error_m=simulation.result(f.POSITION_ERROR).copy(),
-        tolerated=tolerated,
-        lost=lost,
+        tolerated=simulation.state(f.TOLERATED, 1)[:, 0],
+        lost=simulation.state(f.LOST, 1)[:, 0],
         hold_steps=simulation.scenario.hold_s / simulation.scenario.dt_s,
     )
     return {name: metric(sums) for name, metric in METRICS.items()}

@@ -13,6 +13,7 @@ from formation_env.dynamics.base import Array
 
 BOUND: Final = 30.0
 """Every element lies within [-BOUND, BOUND]; what is beyond is cut off."""
+LEAST_LENGTH_M: Final = 1000.0
 LOG_UNIT_POS_M: Final = 1.0
 LOG_UNIT_VEL_M_S: Final = 1e-3
 LOG_RANGE: Final = 1e4
@@ -65,7 +66,7 @@ BLOCKS: Final = (
     Block(
         "measurement_age",
         1,
-        "time since the last measurement that arrived",
+        "time since the last measurement that arrived, or since the start",
         "s",
         "log(1 + / dt) / log(1 + period / dt)",
     ),
@@ -86,7 +87,8 @@ class ObservationLayout:
     """Where each quantity stands in a scenario's observation, and its scale.
 
     Attributes:
-        length_m: L, the largest distance of the plan from the leader, at least 1 km.
+        length_m: L, the largest distance of the plan from the leader; at least 1 km, and at least so much that errors
+            up to the scenario's distance limit stay within the bounds.
         mean_motion_rad_s: n; n L is the scale of velocities.
         period_s: the scale of times, s.
         num_phases: phases of the plan.

@@ -32,7 +32,7 @@ def propagate(
         States (..., T, 6), m and m/s.
 
     Raises:
-        ValueError: unknown model, wrong shape, or a number that is not finite.
+        ValueError: unknown model, wrong shape, a number that is not finite, or unequal air densities.
     """
     states, times = np.asarray(initial_state, float), np.asarray(times_s, float)
     if states.ndim == 0 or states.shape[-1] != 6 or not np.isfinite(states).all():
@@ -40,6 +40,9 @@ def propagate(
     if times.ndim != 1 or not np.isfinite(times).all():
         raise ValueError(f"times_s must be finite with shape (T,), got shape {times.shape}: {times}")
     follower = spacecraft or Spacecraft()
-    model = discretise(get_dynamics(dynamics), times, orbit or Orbit(), follower, leader_spacecraft or follower)
+    leader = leader_spacecraft or follower
+    if leader.air_density_kg_m3 != follower.air_density_kg_m3:
+        raise ValueError("leader_spacecraft.air_density_kg_m3: must be the follower's, they fly through the same air")
+    model = discretise(get_dynamics(dynamics), times, orbit or Orbit(), follower, leader)
     path: Array = np.einsum("tij,...j->...ti", model.Phi, states) + model.delta
     return path

@@ -54,7 +54,7 @@ class Reward:
 
     Attributes:
         error_weight: price of the mean position error of the hold, (m/s) per m.
-        transfer_error_weight: the same for errors during transfer; 0 leaves the way free.
+        transfer_error_weight: price of errors during transfer, also times dt / T_hold; 0 leaves the way free.
         shape: `linear` in the error, or `quadratic`: |e|^2 / quadratic_scale_m in place of |e|.
         quadratic_scale_m: error at which both shapes cost the same, m.
     """
@@ -127,6 +127,11 @@ class Scenario:
             raise ValueError(
                 f"spacecraft.min_accel_m_s2: must not be above the greatest thrust, {greatest:.4g}, got {least:g}"
             )
+        density, leaders = self.spacecraft.air_density_kg_m3, self.leader.air_density_kg_m3
+        if leaders != density:
+            raise ValueError(
+                f"leader_spacecraft.air_density_kg_m3: must be the follower's, {density:g}, got {leaders:g}"
+            )
         self._check_clock()
         self._check_start()
         self.dropout.chain(self.dt_s, self.orbit)
@@ -151,7 +156,7 @@ class Scenario:
                     )
 
     def _check_start(self) -> None:
-        """Refuse a nominal start at which the first step would end the episode."""
+        """Refuse a nominal start, or a change of phase, that would end the episode at once."""
         place = self.start.formation.state(self.orbit)[:3]
         range_m = math.hypot(*place)
         if range_m < self.limits.keep_out_m:
@@ -159,14 +164,16 @@ class Scenario:
                 f"start.formation: {range_m:.6g} m from the leader, inside limits.keep_out_m = "
                 f"{self.limits.keep_out_m:g} m"
             )
-        first = self.phases[0]
-        transfer_s = self.steps(first.transfer_periods) * self.dt_s
-        distance_m = math.dist(place, first.formation.reference(-transfer_s, self.orbit)[:3])
-        if distance_m > self.limits.max_distance_m:
-            raise ValueError(
-                f"start.formation: {distance_m:.6g} m from the first phase's reference, beyond "
-                f"limits.max_distance_m = {self.limits.max_distance_m:g} m"
-            )
+        for index, phase in enumerate(self.phases):
+            transfer_s, hold_s = (self.steps(p) * self.dt_s for p in (phase.transfer_periods, phase.hold_periods))
+            distance_m = math.dist(place, phase.formation.reference(-transfer_s, self.orbit)[:3])
+            if distance_m > self.limits.max_distance_m:
+                key = f"phases.{index}.formation" if index else "start.formation"
+                raise ValueError(
+                    f"{key}: {distance_m:.6g} m between the {'phase before' if index else 'start'} and the phase's "
+                    f"reference, beyond limits.max_distance_m = {self.limits.max_distance_m:g} m"
+                )
+            place = phase.formation.reference(hold_s, self.orbit)[:3]
 
     def steps(self, periods: float) -> int:
         """A time in orbital periods as the nearest number of whole steps."""
@@ -195,7 +202,9 @@ class Scenario:
         """The dynamics that the filter believes, over one step or over step_s, s (an array gives an array)."""
         name = self.filter.dynamics or self.dynamics
         step_s = self.dt_s if step_s is None else step_s
-        return discretise(get_dynamics(name), step_s, self.orbit, self.spacecraft, self.leader)
+        orbit, spacecraft = self.filter.orbit or self.orbit, self.filter.spacecraft or self.spacecraft
+        leader = self.leader_spacecraft or spacecraft
+        return discretise(get_dynamics(name), step_s, orbit, spacecraft, leader)
 
 
 MAX_STEPS = 1_000_000
@@ -222,6 +231,8 @@ def load_scenario(scenario: "str | Path | Scenario") -> Scenario:
         return scenario
     path = Path(scenario)
     if path.suffix not in (".yaml", ".yml"):
+        if path.is_file():
+            raise ConfigError(f"{path}: a scenario file must end in .yaml or .yml")
         path = config_folder("scenarios") / f"{scenario}.yaml"
         if not path.is_file():
             raise ConfigError(f"no scenario named {str(scenario)!r}; {nearest(str(scenario), scenario_names())}")

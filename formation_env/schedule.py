@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, Array
-from formation_env.observation import ObservationLayout
+from formation_env.observation import BOUND, LEAST_LENGTH_M, ObservationLayout
 from formation_env.scenario import Phase, Scenario
 
 FIELDS: Final = {
@@ -26,6 +26,7 @@ FIELDS: Final = {
     "counts": 1,  # 1 if the step to this instant belongs to a hold
     "counts_left": 1,  # later steps that do
     "arrives": 1,  # 1 / number of transfers if one ends at this instant; without any, the start counts
+    "arrives_left": 1,  # sum of the later ones
 }
 
 
@@ -73,7 +74,7 @@ def observation_layout(scenario: Scenario) -> ObservationLayout:
         for leg in legs(scenario)
     ]
     return ObservationLayout(
-        length_m=float(max(start, *held, 1000.0)),
+        length_m=float(max(start, *held, LEAST_LENGTH_M, scenario.limits.max_distance_m / BOUND)),
         mean_motion_rad_s=scenario.orbit.mean_motion_rad_s,
         period_s=scenario.orbit.period_s,
         num_phases=len(scenario.phases),
@@ -90,7 +91,7 @@ def build_schedule(scenario: Scenario) -> Array:
     _column(table, "arrives")[arrivals] = 1 / len(arrivals)
     times_s: Array = scenario.dt_s * np.arange(len(table), dtype=float)
     _column(table, "link_closed")[:] = scenario.dropout.closed(times_s)
-    for name, left in (("error_price", "price_left"), ("counts", "counts_left")):
+    for name, left in (("error_price", "price_left"), ("counts", "counts_left"), ("arrives", "arrives_left")):
         column = _column(table, name)
         _column(table, left)[:] = np.cumsum(column[::-1])[::-1] - column
     return table

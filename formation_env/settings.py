@@ -25,7 +25,6 @@ NonNegative = Annotated[Real, Field(ge=0)]
 Probability = Annotated[Real, Field(ge=0, le=1)]
 Flag = Annotated[bool, Strict()]
 Text = Annotated[str, Strict()]
-Vector3 = tuple[Real, Real, Real]
 
 # What pydantic says of Python objects, in a YAML author's words.
 _PLAIN_WORDS: Final = {

@@ -169,7 +169,8 @@ def test_totals_are_the_sums_of_what_each_step_told(scenario: Scenario, strength
     errors = np.array([info["position_error_m"] for info in infos])
     flown = np.array([instant.held for instant in instants])
     held = errors[flown[: len(errors)]]
-    missed = np.full(int(flown[len(errors) :].sum()), max(errors[-1], scenario.limits.max_distance_m))
+    stay = max(errors[-1], scenario.limits.max_distance_m)
+    missed = np.full(int(flown[len(errors) :].sum()), stay)
     assert (len(missed) > 0) == bool(results[-1][2])
     held = np.concatenate([held, missed])
     arrivals = [
@@ -181,7 +182,7 @@ def test_totals_are_the_sums_of_what_each_step_told(scenario: Scenario, strength
         "position_error_mean_m": held.mean(),
         "position_error_rms_m": np.sqrt((held**2).mean()),
         "position_error_max_m": held.max(),
-        "position_error_arrival_m": sum(errors[k] for k in arrivals if k < len(errors)) / len(arrivals),
+        "position_error_arrival_m": sum(errors[k] if k < len(errors) else stay for k in arrivals) / len(arrivals),
         "position_error_final_m": errors[-1],
         "in_tolerance": (held <= scenario.tolerance_m).mean(),
         "measurements_lost": np.mean([not info["measured"] for info in infos]),

@@ -155,6 +155,9 @@ CONSISTENT = {
     "bad communication": load_scenario("bad_communication"),
     "position only": dataclasses.replace(load_scenario("mission"), sensor=Sensor(measures="position")),
     "carrier phase": start_spread(5.0, 0.01, load_scenario("carrier_phase_gps")),
+    "thrust noise": dataclasses.replace(
+        load_scenario("keeping"), spacecraft=Spacecraft(max_accel_m_s2=0.002, thrust_noise=0.1)
+    ),
     "strong process noise": dataclasses.replace(load_scenario("bx1_companion"), process_noise_m_s2=1e-3),
 }
 

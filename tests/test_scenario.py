@@ -248,7 +248,7 @@ FAULTS = {
     ),
     "start out of bounds": (
         PHASES + "limits: {max_distance_m: 1999}\n",
-        "start.formation: 2000 m from the first phase's reference, beyond limits.max_distance_m = 1999 m",
+        "start.formation: 2000 m between the start and the phase's reference, beyond limits.max_distance_m = 1999 m",
     ),
     "unknown sensor": (PHASES + "sensor: {measures: speed}\n", "sensor.measures: must be .*, got the string 'speed'"),
     "unknown shape": (

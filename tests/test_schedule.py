@@ -10,7 +10,7 @@ from formation_env import Scenario, load_scenario, propagate, scenario_names
 from formation_env.dropout import Window, Windows
 from formation_env.estimation import KalmanFilter
 from formation_env.formations import Following, InTrack, Parallel, ProjectedCircle
-from formation_env.scenario import Phase, Reward
+from formation_env.scenario import Limits, Phase, Reward
 from formation_env.schedule import FIELDS, OFFSETS, build_schedule, leg_reference, legs, observation_layout
 
 COARSE = [name for name in scenario_names() if not name.startswith("thesis")]
@@ -165,4 +165,5 @@ def test_length_scale_is_the_farthest_place_of_the_plan() -> None:
     held = [np.linalg.norm(i.reference[:3]) for i in plan(scenario) if i.held]
     assert observation_layout(scenario).length_m == pytest.approx(max(5000, *held), rel=1e-6)
     near = Scenario(phases=(Phase(formation=Following(y0_m=30.0), hold_periods=1.0),))
-    assert observation_layout(near).length_m == 1000
+    assert observation_layout(near).length_m == pytest.approx(50e3 / 30)
+    assert observation_layout(dataclasses.replace(near, limits=Limits(max_distance_m=9e3))).length_m == 1000

@@ -17,7 +17,6 @@ from formation_env.settings import (
     Probability,
     Real,
     Text,
-    Vector3,
     build,
     load_yaml,
     nearest,
@@ -32,7 +31,7 @@ class Lamp:
     power_w: Positive = 1.0
     share: Probability = 0.5
     lit: Flag = True
-    place_m: Vector3 = (0.0, 0.0, 0.0)
+    place_m: tuple[Real, Real, Real] = (0.0, 0.0, 0.0)
 
 
 @settings

@@ -28,6 +28,7 @@ PRICE_LEFT: Final = f.plan("price_left")
 COUNTS: Final = f.plan("counts")
 COUNTS_LEFT: Final = f.plan("counts_left")
 ARRIVES: Final = f.plan("arrives")
+ARRIVES_LEFT: Final = f.plan("arrives_left")
 TIME_TO_ARRIVAL: Final = f.plan("time_to_arrival")
 IN_HOLD: Final = f.plan("in_hold")
 PHASE: Final = f.plan("phase")
@@ -138,13 +139,15 @@ def dropout(t: Array, i: int, c: Scalars) -> None:
 @lane
 def filter_time_update(t: Array, i: int, model: Model, belief: Belief) -> None:
     """The estimate and its covariance over one step (Ma 2009, eq. 4.74-4.75)."""
-    _propagate(t, i, f.ESTIMATE, model, t[f.COMMAND + i], t[f.COMMAND + LANES + i], t[f.COMMAND + 2 * LANES + i])
+    ax, ay, az = t[f.COMMAND + i], t[f.COMMAND + LANES + i], t[f.COMMAND + 2 * LANES + i]
+    _propagate(t, i, f.ESTIMATE, model, ax, ay, az)
     P = estimation.time_update_4(_load_10(t, f.P_IN_PLANE + i), model.Phi_in_plane, belief.Q_in_plane)
+    P = estimation.thrust_noise_update_4(P, model.Gamma_in_plane, ax, ay, belief.thrust[0])
     _store_10(t, f.P_IN_PLANE + i, P)
     p = f.P_CROSS_TRACK + i
-    t[p], t[p + LANES], t[p + 2 * LANES] = estimation.time_update_2(
-        (t[p], t[p + LANES], t[p + 2 * LANES]), model.Phi_cross_track, belief.Q_cross_track
-    )
+    C = estimation.time_update_2((t[p], t[p + LANES], t[p + 2 * LANES]), model.Phi_cross_track, belief.Q_cross_track)
+    C = estimation.thrust_noise_update_2(C, model.Gamma_cross_track, az, belief.thrust[0])
+    t[p], t[p + LANES], t[p + 2 * LANES] = C
 
 
 @lane
@@ -236,9 +239,10 @@ def reward_and_end(t: Array, i: int, c: Scalars) -> None:
 
 @lane
 def totals(t: Array, i: int, c: Scalars) -> None:
-    """Sums of the episode; after an early end, the rest of the hold counts as flown at the limit."""
+    """Sums of the episode; after an early end, what is left of it counts as flown at the limit."""
     error, counts = t[f.POSITION_ERROR + i], t[COUNTS + i]
-    missed = t[COUNTS_LEFT + i] if t[f.TERMINATED + i] > 0.5 else 0.0
+    gone = 1.0 if t[f.TERMINATED + i] > 0.5 else 0.0
+    missed = gone * t[COUNTS_LEFT + i]
     stay = max(error, c.max_distance)
     worst = max(counts * error, stay if missed > 0.0 else 0.0)
     t[f.SUM_REWARD + i] += t[f.REWARD + i]
@@ -246,7 +250,7 @@ def totals(t: Array, i: int, c: Scalars) -> None:
     t[f.SUM_ERROR + i] += counts * error + missed * stay
     t[f.SUM_SQUARE + i] += counts * error * error + missed * stay * stay
     t[f.MAX_ERROR + i] = max(t[f.MAX_ERROR + i], worst)
-    t[f.ARRIVAL_ERROR + i] += t[ARRIVES + i] * error
+    t[f.ARRIVAL_ERROR + i] += t[ARRIVES + i] * error + gone * t[ARRIVES_LEFT + i] * stay
     t[f.TOLERATED + i] += counts if error <= c.tolerance else 0.0
     t[f.LOST + i] += 1.0 - t[f.MEASURED + i]
 

@@ -33,6 +33,7 @@ class Belief(NamedTuple):
     Q_in_plane: Any  # 10
     Q_cross_track: Any  # 3
     variances: Any  # 2: of a measured position and velocity axis
+    thrust: Any  # 1: variance of the relative error of the thrust's magnitude
     measures: Any  # 2: 1 where the sensor measures positions, velocities
 
 
@@ -68,7 +69,7 @@ class Scalars(NamedTuple):
 to_fixed_tuple: Any = numba_arrays.to_fixed_tuple
 
 MODEL_SIZE: Final = 36
-BELIEF_SIZE: Final = 17
+BELIEF_SIZE: Final = 18
 SCALAR_SIZE: Final = len(Scalars._fields)
 
 
@@ -89,9 +90,10 @@ def unpack(s: Array) -> tuple[Model, Model, Belief, Scalars]:
         to_fixed_tuple(s[72:82], 10),
         to_fixed_tuple(s[82:85], 3),
         to_fixed_tuple(s[85:87], 2),
-        to_fixed_tuple(s[87:89], 2),
+        to_fixed_tuple(s[87:88], 1),
+        to_fixed_tuple(s[88:90], 2),
     )
-    scalars = Scalars(*to_fixed_tuple(s[89:], SCALAR_SIZE))
+    scalars = Scalars(*to_fixed_tuple(s[90:], SCALAR_SIZE))
     return _unpack_model(s[:36]), _unpack_model(s[36:72]), belief, scalars
 
 
@@ -135,6 +137,7 @@ def _belief(scenario: Scenario) -> Belief:
         Q_in_plane=upper_triangle(Q_noise[np.ix_(IN_PLANE, IN_PLANE)]),
         Q_cross_track=upper_triangle(Q_noise[np.ix_(CROSS_TRACK, CROSS_TRACK)]),
         variances=(sigma_pos**2, sigma_vel**2),
+        thrust=(_or(believed.thrust_noise, scenario.spacecraft.thrust_noise) ** 2,),
         measures=(1.0, float(sensor.measures == "position_and_velocity")),
     )
 

@@ -221,8 +221,9 @@ def _compile(source_hash: int) -> tuple[Any, Any]:
             _observe(t, lane_set, c)
             for i in range(len(lane_set)):
                 if chosen[first + i]:
-                    for k in range(SIZE):
-                        observations[first + i, k] = np.float32(t[f.OBSERVATION + k * LANES + i])
+                    if first + i < len(observations):
+                        for k in range(SIZE):
+                            observations[first + i, k] = np.float32(t[f.OBSERVATION + k * LANES + i])
                     for k in range(f.STATE_FIELDS):
                         states[tile, k * LANES + i] = t[k * LANES + i]
                     for k in range(f.NUM_RESULTS):

@@ -54,6 +54,7 @@ class Simulation:
         padded = self.results.shape[1]
         mask = np.zeros(padded, bool)
         mask[: self.num_rows] = chosen
+        mask[self.num_rows :] = chosen.all()  # the padding rows keep step with the others, which is faster
         given = np.full(padded, starts is not None)
         places = np.tile(self._nominal_start, (padded, 1))
         if starts is not None:
