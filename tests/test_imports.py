@@ -101,8 +101,8 @@ def layer(module: str) -> int:
 
 
 def draws(module: str) -> bool:
-    """Whether a module is one of those that plot: rendering, or of a report."""
-    return any(part == "rendering" or part.startswith(("report", "figures")) for part in module.split("."))
+    """Whether a module is one of those that plot: rendering, of a report or of a curve."""
+    return any(part == "rendering" or part.startswith(("report", "figures", "curve")) for part in module.split("."))
 
 
 def test_the_sources_are_read() -> None:

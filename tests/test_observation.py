@@ -198,12 +198,14 @@ def test_the_link_is_seen_and_how_long_it_is_down(flight: Flight) -> None:
 
 
 def test_far_away_the_observation_is_cut_at_its_bounds() -> None:
-    """A follower 45 km off and fast is seen at the bound where a kilometre is the unit, not beyond it."""
+    """A follower 45 km off is seen where it is, for the limit is 50 km; one that fast at the bound, not beyond it."""
     scenario = load_scenario("initialization")
     hold = dataclasses.replace(scenario.phases[0], formation=Following(y0_m=100.0))
     env = FormationVectorEnv(1, dataclasses.replace(scenario, phases=(hold,)))
-    start = [32e3, -32e3, 100, 0, 50, -50]
+    start = [32e3, -32e3, 100, 0, 80, -80]
     observations, infos = env.reset(seed=0, options={"initial_state": start})
-    assert (np.abs(infos["estimate"][0, [0, 1, 4, 5]]) > 30 * np.array([1000, 1000, 1.1, 1.1])).all()
-    np.testing.assert_array_equal(observations[0, SLICES["error"]][[0, 1, 4, 5]], [BOUND, -BOUND, BOUND, -BOUND])
+    assert (np.abs(infos["estimate"][0, 4:]) > 30 * 1.081e-3 * 50e3 / 30).all()
+    error = observations[0, SLICES["error"]]
+    np.testing.assert_array_equal(error[4:], [BOUND, -BOUND])
+    np.testing.assert_allclose(error[:1], infos["estimate"][0, :1] / (50e3 / 30), rtol=1e-6)
     assert env.observation_space.contains(observations)
