@@ -167,7 +167,9 @@ def measure_first(
 ) -> tuple[State4, Symmetric4, float]:
     """Measurement update (eq. 4.71-4.73) with one measurement of the state's first element.
 
-    The covariance takes Joseph's form, (I - K H) P (I - K H)' + K R_noise K', which is positive for any gain.
+    The measured element's row of the covariance takes Joseph's form, (I - K H) P (I - K H)' + K R_noise K', where
+    (I - K H) P would cancel; the rest is P - K H P, to which Joseph's form reduces for this gain. It is symmetric by
+    construction.
 
     Args:
         x_hat: estimate (4).
@@ -186,19 +188,18 @@ def measure_first(
     innovation = z - x0
     k0, k1, k2, k3 = p00 * weight, p01 * weight, p02 * weight, p03 * weight
     rest = 1.0 - k0
-    q1, q2, q3 = p01 - k1 * s, p02 - k2 * s, p03 - k3 * s
     new_x = (x0 + k0 * innovation, x1 + k1 * innovation, x2 + k2 * innovation, x3 + k3 * innovation)
     new_P = (
         rest * rest * p00 + k0 * k0 * variance,
         rest * (p01 - k1 * p00) + k0 * k1 * variance,
         rest * (p02 - k2 * p00) + k0 * k2 * variance,
         rest * (p03 - k3 * p00) + k0 * k3 * variance,
-        p11 - k1 * p01 - k1 * q1,
-        p12 - k1 * p02 - k2 * q1,
-        p13 - k1 * p03 - k3 * q1,
-        p22 - k2 * p02 - k2 * q2,
-        p23 - k2 * p03 - k3 * q2,
-        p33 - k3 * p03 - k3 * q3,
+        p11 - k1 * p01,
+        p12 - k1 * p02,
+        p13 - k1 * p03,
+        p22 - k2 * p02,
+        p23 - k2 * p03,
+        p33 - k3 * p03,
     )
     return new_x, new_P, innovation * innovation * weight
 

@@ -7,8 +7,9 @@ from typing import Final
 import numpy as np
 
 from formation_env.dynamics.base import Array
+from formation_env.jit import LANES
 from formation_env.kernel import tile as f
-from formation_env.kernel.simulation import Simulation
+from formation_env.kernel.simulation import Rows, Simulation
 
 
 @dataclass(frozen=True)
@@ -109,19 +110,25 @@ METRICS: Final[dict[str, Callable[[Sums], Array]]] = {
 }
 
 
-def episode_metrics(simulation: Simulation) -> dict[str, Array]:
-    """Metrics of the rows' episodes up to now, each (num_rows,)."""
+def episode_metrics(simulation: Simulation, rows: Rows = slice(None)) -> dict[str, Array]:
+    """Metrics of the episodes of some rows up to now, each (rows,)."""
+    totals: Array = simulation.state(f.FIRST_TOTAL, f.NUM_TOTALS, rows).T
+
+    def total(field: int) -> Array:
+        column: Array = totals[(field - f.FIRST_TOTAL) // LANES]
+        return column
+
     sums = Sums(
-        steps=simulation.state(f.STEP, 1)[:, 0],
-        reward=simulation.state(f.SUM_REWARD, 1)[:, 0],
-        delta_v_m_s=simulation.state(f.SUM_DELTA_V, 1)[:, 0],
-        error_m=simulation.state(f.SUM_ERROR, 1)[:, 0],
-        square_m2=simulation.state(f.SUM_SQUARE, 1)[:, 0],
-        max_error_m=simulation.state(f.MAX_ERROR, 1)[:, 0],
-        arrival_error_m=simulation.state(f.ARRIVAL_ERROR, 1)[:, 0],
-        final_error_m=simulation.result(f.POSITION_ERROR).copy(),
-        tolerated=simulation.state(f.TOLERATED, 1)[:, 0],
-        lost=simulation.state(f.LOST, 1)[:, 0],
+        steps=simulation.state(f.STEP, 1, rows)[:, 0],
+        reward=total(f.SUM_REWARD),
+        delta_v_m_s=total(f.SUM_DELTA_V),
+        error_m=total(f.SUM_ERROR),
+        square_m2=total(f.SUM_SQUARE),
+        max_error_m=total(f.MAX_ERROR),
+        arrival_error_m=total(f.ARRIVAL_ERROR),
+        final_error_m=simulation.result(f.POSITION_ERROR, rows).copy(),
+        tolerated=total(f.TOLERATED),
+        lost=total(f.LOST),
         hold_steps=simulation.scenario.hold_s / simulation.scenario.dt_s,
     )
     return {name: metric(sums) for name, metric in METRICS.items()}

@@ -20,6 +20,7 @@ Observation = NDArray[np.float32]
 _REWARD, _TERMINATED, _TRUNCATED, _THRUST = (
     (field - f.RESULTS) // LANES for field in (f.REWARD, f.TERMINATED, f.TRUNCATED, f.THRUST)
 )
+_ONLY_ROW = np.zeros(1, np.intp)
 
 
 class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -70,7 +71,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self.simulation.seed(0, self.np_random)
             self._keyed = True
         observations = self.simulation.new_observations()
-        self.simulation.reset(np.ones(1, bool), observations, starts)
+        self.simulation.reset(_ONLY_ROW, observations, starts)
         if self._renderer is not None:
             self._renderer.restart()
         if self.render_mode == "human":

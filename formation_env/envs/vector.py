@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from formation_env.envs import interface
 from formation_env.kernel import tile as f
-from formation_env.kernel.simulation import Simulation
+from formation_env.kernel.simulation import Rows, Simulation
 from formation_env.metrics import episode_metrics
 from formation_env.scenario import Scenario, load_scenario
 
@@ -76,24 +76,25 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             ValueError: wrong options or number of seeds.
         """
         others = dict(options or {})
-        chosen = self._mask(others.pop(MASK_OPTION, None))
+        rows = self._rows(others.pop(MASK_OPTION, None))
         starts = interface.read_start(others, self.simulation)
-        self._seed(seed, chosen)
-        self.simulation.reset(chosen, self._observations, starts)
-        infos = self._infos()
-        return self._observations.copy(), infos if chosen.all() else _only(infos, chosen)
+        self._seed(seed, rows)
+        self.simulation.reset(rows, self._observations, None if starts is None else starts[rows])
+        return self._observations.copy(), self._infos(rows if len(rows) < self.num_envs else slice(None))
 
-    def _mask(self, given: Any) -> Flags:
-        """The rows to reset: all, or those given."""
-        mask = np.ones(self.num_envs, bool) if given is None else np.asarray(given)
+    def _rows(self, mask: Any) -> NDArray[np.intp]:
+        """Indices of the rows to reset: all, or those of a mask."""
+        if mask is None:
+            return np.arange(self.num_envs)
+        mask = np.asarray(mask)
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
             raise ValueError(f"{MASK_OPTION}: must be bool ({self.num_envs},), got {mask.dtype} {mask.shape}")
         if not self._keyed and not mask.all():
             raise ValueError(f"{MASK_OPTION}: the first reset must be of all rows")
-        return mask
+        return np.flatnonzero(mask)
 
-    def _seed(self, seed: int | Sequence[int | None] | None, chosen: Flags) -> None:
-        """Give streams to the chosen rows that have a seed, or to all that have none yet."""
+    def _seed(self, seed: int | Sequence[int | None] | None, rows: NDArray[np.intp]) -> None:
+        """Give streams to those of some rows that have a seed, or to all of them that have none yet."""
         if isinstance(seed, (int, np.integer)):
             seeds: Sequence[int | None] = range(int(seed), int(seed) + self.num_envs)
             self._np_random, self._np_random_seed = gymnasium.utils.seeding.np_random(int(seed))
@@ -101,9 +102,9 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             seeds = [None] * self.num_envs if seed is None else seed
         if len(seeds) != self.num_envs:
             raise ValueError(f"seed: a list must have {self.num_envs} elements, got {len(seeds)}")
-        rows = [row for row in np.flatnonzero(chosen).tolist() if seeds[row] is not None or not self._keyed]
-        generators = [gymnasium.utils.seeding.np_random(seeds[row])[0] for row in rows]
-        for row, generator in zip(rows, generators, strict=True):
+        keyed = [row for row in rows.tolist() if seeds[row] is not None or not self._keyed]
+        generators = [gymnasium.utils.seeding.np_random(seeds[row])[0] for row in keyed]
+        for row, generator in zip(keyed, generators, strict=True):
             self.simulation.seed(row, generator)
         self._keyed = True
 
@@ -126,46 +127,43 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         rewards = simulation.result(f.REWARD).copy()
         terminations = simulation.result(f.TERMINATED) > 0.5
         truncations = simulation.result(f.TRUNCATED) > 0.5
-        ended = terminations | truncations
-        finals = self._begin_next(ended) if ended.any() else {}
+        ended = np.flatnonzero(terminations | truncations)
+        finals = self._begin_next(ended) if len(ended) else {}
         return self._observations.copy(), rewards, terminations, truncations, {**self._infos(), **finals}
 
-    def _begin_next(self, ended: Flags) -> dict[str, Any]:
+    def _begin_next(self, ended: NDArray[np.intp]) -> dict[str, Any]:
         """Reset the rows that ended; what they ended with, in Gymnasium's form."""
-        final_info = self._infos()
-        totals: dict[str, Any] = dict(episode_metrics(self.simulation))
-        final_info[interface.TOTALS] = totals | {f"_{name}": ended for name in totals}
-        final_info[f"_{interface.TOTALS}"] = ended
+        final_info = self._infos(ended)
+        final_info |= self._spread(
+            {interface.TOTALS: self._spread(episode_metrics(self.simulation, ended), ended)}, ended
+        )
         final_obs = np.full(self.num_envs, None, dtype=object)
-        for row in np.flatnonzero(ended):
+        for row in ended.tolist():
             final_obs[row] = self._observations[row].copy()
         self.simulation.reset(ended, self._observations)
-        return {
-            "final_obs": final_obs,
-            "_final_obs": ended,
-            "final_info": _only(final_info, ended),
-            "_final_info": ended.copy(),
-        }
+        finals = self._spread({"final_info": final_info}, ended)
+        return finals | {"final_obs": final_obs, "_final_obs": finals["_final_info"].copy()}
 
-    def _infos(self) -> dict[str, Any]:
-        """Infos of the last step, in Gymnasium's form: each key has an array, and a mask of the rows that have it."""
+    def _infos(self, rows: Rows = slice(None)) -> dict[str, Any]:
+        """Infos of some rows of the last step, in Gymnasium's form."""
         simulation = self.simulation
         infos: dict[str, Any] = {
-            name: simulation.state(field, size) for name, (field, size) in interface.INFO_STATES.items()
+            name: simulation.state(field, size, rows) for name, (field, size) in interface.INFO_STATES.items()
         }
-        infos[interface.INFO_THRUST] = simulation.result_vector(f.THRUST, 3)
+        infos[interface.INFO_THRUST] = simulation.result_vector(f.THRUST, 3, rows)
         for name, (field, kind) in interface.INFO_SCALARS.items():
-            infos[name] = simulation.result(field).astype(kind)
-        return infos | {f"_{name}": np.ones(self.num_envs, bool) for name in infos}
+            infos[name] = simulation.result(field, rows).astype(kind)
+        return self._spread(infos, rows)
 
-
-def _only(infos: dict[str, Any], rows: Flags) -> dict[str, Any]:
-    """Infos with all other rows blank: zero, and not in the masks."""
-    blank: dict[str, Any] = {}
-    for name, value in infos.items():
-        if isinstance(value, dict):
-            blank[name] = _only(value, rows)
-        else:
-            mask = rows.reshape(-1, *[1] * (value.ndim - 1))
-            blank[name] = np.where(mask, value, np.zeros((), value.dtype))
-    return blank
+    def _spread(self, values: dict[str, Any], rows: Rows) -> dict[str, Any]:
+        """Values of some rows as arrays of all, zero elsewhere, each with a mask of the rows that have it."""
+        masks = np.zeros((len(values), self.num_envs), bool)
+        masks[:, rows] = True
+        spread: dict[str, Any] = {}
+        for (name, value), mask in zip(values.items(), masks, strict=True):
+            spread[name] = value
+            if not isinstance(value, dict) and not isinstance(rows, slice):
+                spread[name] = np.zeros((self.num_envs, *value.shape[1:]), value.dtype)
+                spread[name][rows] = value
+            spread[f"_{name}"] = mask
+        return spread

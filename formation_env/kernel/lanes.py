@@ -343,5 +343,5 @@ def begin(t: Array, i: int, given: bool, c: Scalars) -> None:
     t[f.DELTA_V + i] = 0.0
     for k in range(3):
         t[f.THRUST + k * LANES + i] = 0.0
-    for total in range(f.SUM_REWARD, f.STATE_FIELDS * LANES, LANES):
+    for total in range(f.FIRST_TOTAL, f.FIRST_TOTAL + f.NUM_TOTALS * LANES, LANES):
         t[total + i] = 0.0

@@ -80,18 +80,19 @@ def _observe(t: Array, lane_set: LaneSet, c: packing.Scalars) -> None:
 
 
 @stage
-def _begin(t: Array, lane_set: LaneSet, given: NDArray[np.bool_], c: packing.Scalars) -> None:
+def _begin(t: Array, lane_set: LaneSet, given: bool, c: packing.Scalars) -> None:
     for i in range(len(lane_set)):
-        lanes.begin(t, i, given[i], c)
+        lanes.begin(t, i, given, c)
 
 
 @stage
-def _read_plan(t: Array, lane_set: LaneSet, schedule: Array, known_step: int) -> int:
+def _read_plan(t: Array, lane_set: LaneSet, used: int, schedule: Array, known_step: int) -> int:
     """The schedule's rows. Mostly all rows are at one step, which the scratch space may hold already.
 
     Args:
         t: the tile.
-        lane_set: as long as the rows used of the tile.
+        lane_set: as long as the lanes computed.
+        used: how many of them are rows; the others do not matter.
         schedule: the table.
         known_step: the step whose row the whole tile holds, or -1.
 
@@ -101,15 +102,21 @@ def _read_plan(t: Array, lane_set: LaneSet, schedule: Array, known_step: int) ->
     last = len(schedule) - 1
     first = min(int(t[f.STEP]), last)
     same = True
-    for i in range(1, len(lane_set)):
+    for i in range(1, used):
         same &= t[f.STEP + i] == t[f.STEP]
     if same and first == known_step:
         return first
-    for k in range(WIDTH):
-        for i in range(len(lane_set)):
-            step = first if same else min(int(t[f.STEP + i]), last)
+    if same:
+        for k in range(WIDTH):
+            value = schedule[first, k]
+            for i in range(len(lane_set)):
+                t[f.PLAN + k * LANES + i] = value
+        return first
+    for i in range(len(lane_set)):
+        step = min(int(t[f.STEP + i]), last)
+        for k in range(WIDTH):
             t[f.PLAN + k * LANES + i] = schedule[step, k]
-    return first if same else -1
+    return -1
 
 
 def _compile(source_hash: int) -> tuple[Any, Any]:
@@ -156,7 +163,7 @@ def _compile(source_hash: int) -> tuple[Any, Any]:
                     t[f.ACTION + k * LANES + i] = actions[first + i, k]
             for i in range(len(lane_set)):
                 t[f.STEP + i] += 1.0
-            known_step = _read_plan(t, lane_set, schedule, known_step)
+            known_step = _read_plan(t, lane_set, used, schedule, known_step)
             _draw(t, lane_set, 0)
             _move(t, lane_set, truth, c)
             _predict(t, lane_set, believed, belief)
@@ -179,55 +186,53 @@ def _compile(source_hash: int) -> tuple[Any, Any]:
         t: Array,
         schedule: Array,
         settings: Array,
-        chosen: NDArray[np.bool_],
-        given: NDArray[np.bool_],
+        rows: NDArray[np.intp],
         starts: Array,
+        given: bool,
         observations: NDArray[np.float32],
         results: Array,
         lane_set: LaneSet,
     ) -> int:
-        """Start the next episode of some rows. A whole tile is begun in scratch space, and what was chosen is kept.
+        """Start the next episode of some rows, which are put side by side in scratch space.
 
         Args:
             states: as in `step`.
             t: as in `step`.
             schedule: as in `step`.
             settings: as in `step`.
-            chosen: rows to begin (tiles * LANES,).
-            given: rows that start just at their start, not about it (tiles * LANES,).
-            starts: states to start at (tiles * LANES, 6).
-            observations: written in the rows chosen.
-            results: written in the rows chosen.
+            rows: which rows (k,).
+            starts: states to start at (k, 6).
+            given: whether the rows start just there, not about it.
+            observations: written in these rows.
+            results: written in these rows.
             lane_set: as in `step`.
         """
         _, _, belief, c = packing.unpack(settings)
-        for tile in range(len(states)):
-            first = tile * LANES
-            if not chosen[first : first + LANES].any():
-                continue
-            for k in range(_STATE_SIZE):
-                t[k] = states[tile, k]
+        for first in range(0, len(rows), len(lane_set)):
             for i in range(len(lane_set)):
+                source = min(first + i, len(rows) - 1)  # idle lanes repeat the last row
+                tile, lane = rows[source] // LANES, rows[source] % LANES
+                for k in range(f.STATE_FIELDS):
+                    t[k * LANES + i] = states[tile, k * LANES + lane]
+                for k in range(6):
+                    t[f.TRUTH + k * LANES + i] = starts[source, k]
                 t[f.STEP + i] = 0.0
                 t[f.EPISODE + i] += 1.0
-                for k in range(6):
-                    t[f.TRUTH + k * LANES + i] = starts[first + i, k]
-            _read_plan(t, lane_set, schedule, -1)
+            _read_plan(t, lane_set, len(lane_set), schedule, -1)
             _draw(t, lane_set, _RESET_BLOCK)
-            _begin(t, lane_set, given[first : first + LANES], c)
+            _begin(t, lane_set, given, c)
             _draw(t, lane_set, 0)
             _measure(t, lane_set, belief, c)
             _judge(t, lane_set, c)
             _observe(t, lane_set, c)
-            for i in range(len(lane_set)):
-                if chosen[first + i]:
-                    if first + i < len(observations):
-                        for k in range(SIZE):
-                            observations[first + i, k] = np.float32(t[f.OBSERVATION + k * LANES + i])
-                    for k in range(f.STATE_FIELDS):
-                        states[tile, k * LANES + i] = t[k * LANES + i]
-                    for k in range(f.NUM_RESULTS):
-                        results[k, first + i] = t[f.RESULTS + k * LANES + i]
+            for i in range(min(len(lane_set), len(rows) - first)):
+                row = rows[first + i]
+                for k in range(f.STATE_FIELDS):
+                    states[row // LANES, k * LANES + row % LANES] = t[k * LANES + i]
+                for k in range(SIZE):
+                    observations[row, k] = np.float32(t[f.OBSERVATION + k * LANES + i])
+                for k in range(f.NUM_RESULTS):
+                    results[k, row] = t[f.RESULTS + k * LANES + i]
         return source_hash
 
     return step, reset

@@ -12,6 +12,9 @@ from formation_env.scenario import Scenario
 from formation_env.schedule import OFFSETS, build_schedule
 from formation_env.streams import stream_key
 
+Rows = slice | NDArray[np.intp]
+"""Some rows: a slice, or their indices."""
+
 
 class Simulation:
     """Many independent episodes of one scenario, stepped together.
@@ -43,30 +46,23 @@ class Simulation:
         for field, value in ((f.KEY, key[0]), (f.KEY + LANES, key[1]), (f.EPISODE, -1.0)):
             self._states[row // LANES, field + row % LANES] = value
 
-    def reset(self, chosen: NDArray[np.bool_], observations: NDArray[np.float32], starts: Array | None = None) -> None:
+    def reset(self, rows: NDArray[np.intp], observations: NDArray[np.float32], starts: Array | None = None) -> None:
         """Begin the next episode of some rows.
 
         Args:
-            chosen: which rows (num_rows,).
-            observations: (num_rows, SIZE), written in the rows chosen.
-            starts: LVLH states (num_rows, 6) to start at, in place of the scenario's start and its spread.
+            rows: their indices (k,).
+            observations: (num_rows, SIZE), written in these rows.
+            starts: LVLH states (k, 6) to start at, in place of the scenario's start and its spread.
         """
-        padded = self.results.shape[1]
-        mask = np.zeros(padded, bool)
-        mask[: self.num_rows] = chosen
-        mask[self.num_rows :] = chosen.all()  # the padding rows keep step with the others, which is faster
-        given = np.full(padded, starts is not None)
-        places = np.tile(self._nominal_start, (padded, 1))
-        if starts is not None:
-            places[: self.num_rows] = starts
+        places = np.tile(self._nominal_start, (len(rows), 1)) if starts is None else np.ascontiguousarray(starts)
         program.reset(
             self._states,
             self._scratch,
             self.schedule,
             self._settings,
-            mask,
-            given,
+            rows,
             places,
+            starts is not None,
             observations,
             self.results,
             self._lane_set,
@@ -93,14 +89,14 @@ class Simulation:
         """An array for the observations of all rows."""
         return np.empty((self.num_rows, observation.SIZE), np.float32)
 
-    def result(self, field: int) -> Array:
-        """View (num_rows,) of one result of the last step."""
-        return self.results[(field - f.RESULTS) // LANES, : self.num_rows]
+    def result(self, field: int, rows: Rows = slice(None)) -> Array:
+        """One result of the last step (rows,); a view if the rows are a slice."""
+        return self.results[(field - f.RESULTS) // LANES, : self.num_rows][rows]
 
-    def result_vector(self, field: int, size: int) -> Array:
-        """Copy (num_rows, size) of consecutive results of the last step."""
+    def result_vector(self, field: int, size: int, rows: Rows = slice(None)) -> Array:
+        """Copy (rows, size) of consecutive results of the last step."""
         first = (field - f.RESULTS) // LANES
-        return self.results[first : first + size, : self.num_rows].T.copy()
+        return self.results[first : first + size, : self.num_rows].T[rows].copy()
 
     @property
     def first_reference_m(self) -> Array:
@@ -108,10 +104,14 @@ class Simulation:
         first = OFFSETS["scored_position"]
         return self.schedule[0, first : first + 3]
 
-    def state(self, field: int, size: int) -> Array:
-        """Copy (num_rows, size) of consecutive state fields."""
-        block = self._states[:, field : field + size * LANES].reshape(-1, size, LANES)
-        return block.transpose(0, 2, 1).copy().reshape(-1, size)[: self.num_rows]
+    def state(self, field: int, size: int, rows: Rows = slice(None)) -> Array:
+        """Copy (rows, size) of consecutive state fields."""
+        if isinstance(rows, slice):
+            block = self._states[:, field : field + size * LANES].reshape(-1, size, LANES)
+            return block.transpose(0, 2, 1).copy().reshape(-1, size)[: self.num_rows][rows]
+        columns = field + np.arange(size) * LANES
+        values: Array = self._states[(rows // LANES)[:, None], columns + (rows % LANES)[:, None]]
+        return values
 
     def row_state(self, field: int, size: int) -> Array:
         """Copy (size,) of consecutive state fields of the first row."""

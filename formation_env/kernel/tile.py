@@ -31,6 +31,7 @@ P_CROSS_TRACK: Final = _field(3)
 LINK_UP: Final = _field()
 AGE: Final = _field()  # s since the last measurement
 # Totals of the episode.
+FIRST_TOTAL: Final = _next_field * LANES
 SUM_REWARD: Final = _field()
 SUM_DELTA_V: Final = _field()
 SUM_ERROR: Final = _field()  # over the hold
@@ -39,6 +40,7 @@ MAX_ERROR: Final = _field()
 ARRIVAL_ERROR: Final = _field()
 TOLERATED: Final = _field()  # steps of the hold within the tolerance
 LOST: Final = _field()  # steps without a measurement
+NUM_TOTALS: Final = _next_field - FIRST_TOTAL // LANES
 STATE_FIELDS: Final = _next_field
 
 # Scratch: inputs of the step.
