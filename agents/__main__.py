@@ -24,6 +24,9 @@ def _plain_errors() -> Iterator[None]:
     """A mistake of the user is one line, not a traceback."""
     try:
         yield
+    except KeyboardInterrupt:
+        typer.echo("interrupted, nothing written", err=True)
+        raise typer.Exit(INTERRUPTED) from None
     except (ConfigError, OSError) as error:
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(MISTAKE) from None

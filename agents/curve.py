@@ -8,10 +8,10 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from agents.files import replacing
 from agents.runs import CURVE, Run, load_run
 from agents.validation import validate
 from baselines import make_policy
+from formation_env.files import replacing
 from formation_env.settings import ConfigError
 
 COLORS: Final = {"zero": "#868b94", "lqr": "#0072B2", "lqr_tracking": "#56B4E9", "smc": "#D55E00"}

@@ -11,8 +11,8 @@ from zipfile import BadZipFile, is_zipfile
 import numpy as np
 from pydantic import Field, Strict
 
-from agents.files import replacing, write_text
 from agents.settings import SETTINGS, AgentSettings, Algorithm
+from formation_env.files import replacing, write_texts
 from formation_env.scenario import Scenario
 from formation_env.settings import ConfigError, Text, build, settings
 
@@ -72,7 +72,7 @@ def start_run(run: Run, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     if (folder / RUN).exists():
         raise ConfigError(f"{folder}: holds a run already; give another folder, or remove this one")
-    write_text(folder / RUN, json.dumps(asdict(run), indent=2) + "\n")
+    write_texts(folder, {RUN: json.dumps(asdict(run), indent=2) + "\n"})
 
 
 def load_run(folder: Path) -> Run:

@@ -8,9 +8,9 @@ import pandas as pd
 from stable_baselines3.common.callbacks import BaseCallback
 from tqdm import tqdm
 
-from agents.files import replacing
 from agents.runs import CURVE, LAST_MODEL, MODEL, LearnedPolicy, Run, save_model
 from formation_env.evaluation import Policy, bootstrap_interval, evaluate
+from formation_env.files import replacing
 from formation_env.scenario import Scenario
 from formation_env.seeds import seeds
 

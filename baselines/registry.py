@@ -1,6 +1,7 @@
 """Policies by name, and where their gains come from. To add a policy: a file, and a line in `POLICIES`."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -58,9 +59,15 @@ def gains_path(scenario: str | Path | Scenario) -> Path:
     name = ENV_IDS.get(scenario, scenario) if isinstance(scenario, str) else scenario
     if name not in scenario_names():
         loaded = load_scenario(name)
-        name = next((known for known in scenario_names() if load_scenario(known) == loaded), "default")
+        name = next((known for known, shipped in _shipped_scenarios().items() if shipped == loaded), "default")
     path = folder / f"{name}.yaml"
     return path if path.is_file() else folder / "default.yaml"
+
+
+@lru_cache(maxsize=1)
+def _shipped_scenarios() -> dict[str, Scenario]:
+    """The scenarios that come with the package, by name."""
+    return {name: load_scenario(name) for name in scenario_names()}
 
 
 def read_gains(name: str, path: Path) -> Any:

@@ -5,7 +5,6 @@ candidates of a generation fly the same episodes side by side, so they differ by
 """
 
 import copy
-import os
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from baselines.policy import Actions, Observations
 from baselines.registry import make_policy, read_gains
 from formation_env.dynamics.base import Array
 from formation_env.evaluation import Policy, evaluate
+from formation_env.files import write_texts
 from formation_env.scenario import Scenario, config_folder, load_scenario, scenario_names
 from formation_env.seeds import seeds
 from formation_env.settings import ConfigError, load_yaml
@@ -197,7 +197,7 @@ def _tune_one(policy: str, name: str, episodes: int, generations: int, folder: P
     command = f"python -m baselines tune {name} --policy {policy} --episodes {episodes} --generations {generations}"
     comment = f"{command}\nseeds {episode_seeds[0]} to {episode_seeds[-1]}, mean cost {cost:.4f} m/s"
     text = path.read_text() if path.is_file() else f"# Gains of the classical policies for {Path(name).stem}.\n"
-    write_atomically(path, replace_section(text, policy, section(policy, gains, comment)))
+    write_texts(folder, {path.name: replace_section(text, policy, section(policy, gains, comment))})
     return cost
 
 
@@ -218,14 +218,3 @@ def replace_section(text: str, policy: str, new: str) -> str:
     if old.search(text):
         return old.sub(lambda _: new, text, count=1)
     return f"{text.rstrip()}\n\n{new}"
-
-
-def write_atomically(path: Path, text: str) -> None:
-    """Write a file so that it is there as a whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_text(text)
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)

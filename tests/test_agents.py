@@ -12,7 +12,6 @@ from typer.testing import CliRunner
 
 from agents import load_policy
 from agents.__main__ import INTERRUPTED, MISTAKE, app
-from agents.files import replacing
 from agents.plan import plan_run
 from agents.report import learned, parse_models
 from agents.runs import CURVE, LAST_MODEL, MODEL, RUN, Run, load_run, save_model, start_run
@@ -21,6 +20,7 @@ from agents.train import train, training_seeds
 from agents.validation import Validation, validate
 from formation_env import ConfigError, FormationEnv, Scenario
 from formation_env.evaluation import evaluate
+from formation_env.files import replacing
 from formation_env.seeds import seeds
 
 SCENARIO = """

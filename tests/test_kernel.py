@@ -17,6 +17,7 @@ from formation_env import FormationVectorEnv, load_scenario, scenario_names
 from formation_env.estimation import KalmanFilter
 from formation_env.kernel import packing, program, tile
 from formation_env.kernel.simulation import Simulation
+from formation_env.observation import SIZE
 
 PACKAGE = Path(formation_env.__file__).parent
 TREES = {
@@ -147,3 +148,18 @@ def test_the_program_carries_the_hash_of_its_sources() -> None:
     """The key is what the sources on the disk give: an equal checkout finds the cache, another does not."""
     assert program._source_hash() == program._source_hash()
     assert 0 <= program._source_hash() < 2**63
+
+
+def test_reset_writes_the_rows_asked_for_only() -> None:
+    """Rows are reset in groups of a tile's width; nothing but those asked for is written, nor past the array's end."""
+    simulation = Simulation(load_scenario("keeping"), 40)
+    guarded = np.full((44, SIZE), 7.0, np.float32)
+    observations = guarded[:40]
+    rows = np.array([0, 3, 31, 32, 39])
+    for row in range(40):
+        simulation.seed(row, np.random.default_rng(row))
+    simulation.reset(rows, observations)
+    others = np.setdiff1d(np.arange(44), rows)
+    assert (guarded[others] == 7.0).all()
+    assert np.isfinite(observations[rows]).all()
+    assert not (observations[rows] == 7.0).any()
