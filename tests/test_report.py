@@ -181,7 +181,7 @@ def test_an_environment_without_policy_is_refused(tmp_path: Path) -> None:
 def test_ctrl_c_ends_in_one_line_and_leaves_nothing(tmp_path: Path) -> None:
     """SIGINT during the flights of the real command: non-zero exit, one line after the progress bar, no file."""
     out = tmp_path / "out"
-    arguments = ["report", "--episodes", "4000", "--env", "mission", "--policy", "zero", "--out", str(out)]
+    arguments = ["report", "--episodes", "20000", "--env", "mission", "--policy", "zero", "--out", str(out)]
     process = subprocess.Popen([sys.executable, "-m", "baselines", *arguments], stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
     shown = ""
