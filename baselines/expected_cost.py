@@ -42,14 +42,11 @@ class Knowledge:
 
 def knowledge(scenario: Scenario, model: DiscreteModel) -> Knowledge:
     """The filter's covariances over an episode in which all measurements arrive (Ma 2009, eq. 4.71-4.75)."""
-    belief, sensor, start = scenario.filter, scenario.sensor, scenario.start
-    sigma_pos = sensor.sigma_pos_m if belief.sigma_pos_m is None else belief.sigma_pos_m
-    sigma_vel = sensor.sigma_vel_m_s if belief.sigma_vel_m_s is None else belief.sigma_vel_m_s
-    push = scenario.process_noise_m_s2 if belief.process_noise_m_s2 is None else belief.process_noise_m_s2
-    H = np.eye(6) if sensor.measures == "position_and_velocity" else np.eye(3, 6)
-    R_noise = np.diag(np.repeat([sigma_pos, sigma_vel], 3) ** 2)[: len(H), : len(H)]
+    belief, start = scenario.belief, scenario.start
+    H = np.eye(6) if scenario.sensor.measures == "position_and_velocity" else np.eye(3, 6)
+    R_noise = np.diag(np.repeat([belief.sigma_pos_m, belief.sigma_vel_m_s], 3) ** 2)[: len(H), : len(H)]
     P = np.diag(np.repeat([start.spread_pos_m, start.spread_vel_m_s], 3) ** 2)
-    Q_noise = process_noise_covariance(model.Gamma, push)
+    Q_noise = process_noise_covariance(model.Gamma, belief.process_noise_m_s2)
     missed, learned = np.zeros((2, scenario.num_steps + 1, 6, 6))
     for step in range(scenario.num_steps + 1):
         S = H @ P @ H.T + R_noise

@@ -7,6 +7,7 @@ their measurement errors; so their covariances have no common elements and they 
 is a tuple of its upper triangle, row by row. Measurements are independent, so they are taken one at a time.
 """
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -63,6 +64,21 @@ class KalmanFilter:
     spacecraft: Spacecraft | None = None
     initial_sigma_pos_m: NonNegative | None = None
     initial_sigma_vel_m_s: NonNegative | None = None
+
+
+@dataclass(frozen=True)
+class Belief:
+    """`KalmanFilter` with the truth's value wherever it leaves one out."""
+
+    dynamics: str
+    sigma_pos_m: float
+    sigma_vel_m_s: float
+    process_noise_m_s2: float
+    thrust_noise: float
+    orbit: Orbit
+    spacecraft: Spacecraft
+    initial_sigma_pos_m: float
+    initial_sigma_vel_m_s: float
 
 
 def process_noise_covariance(Gamma: Array, sigma_m_s2: float) -> Array:

@@ -1,6 +1,7 @@
 """What is flown: a scenario, and its loader."""
 
 import math
+from dataclasses import fields, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Literal, Self
@@ -9,7 +10,7 @@ from pydantic import model_validator
 
 from formation_env.dropout import AnyDropout, GilbertElliott
 from formation_env.dynamics import DYNAMICS, DiscreteModel, discretise, get_dynamics
-from formation_env.estimation import KalmanFilter, Sensor
+from formation_env.estimation import Belief, KalmanFilter, Sensor
 from formation_env.formations import AnyFormation, AtLeader
 from formation_env.orbit import Orbit
 from formation_env.settings import ConfigError, NonNegative, Positive, Text, build, load_yaml, nearest, settings
@@ -198,13 +199,28 @@ class Scenario:
         """The true dynamics over one step."""
         return discretise(get_dynamics(self.dynamics), self.dt_s, self.orbit, self.spacecraft, self.leader)
 
+    @property
+    def belief(self) -> Belief:
+        """What the filter believes, in full."""
+        truth = Belief(
+            dynamics=self.dynamics,
+            sigma_pos_m=self.sensor.sigma_pos_m,
+            sigma_vel_m_s=self.sensor.sigma_vel_m_s,
+            process_noise_m_s2=self.process_noise_m_s2,
+            thrust_noise=self.spacecraft.thrust_noise,
+            orbit=self.orbit,
+            spacecraft=self.spacecraft,
+            initial_sigma_pos_m=self.start.spread_pos_m,
+            initial_sigma_vel_m_s=self.start.spread_vel_m_s,
+        )
+        own = {field.name: getattr(self.filter, field.name) for field in fields(truth)}
+        return replace(truth, **{name: value for name, value in own.items() if value is not None})
+
     def filter_model(self, step_s: float | None = None) -> DiscreteModel:
         """The dynamics that the filter believes, over one step or over step_s, s (an array gives an array)."""
-        name = self.filter.dynamics or self.dynamics
-        step_s = self.dt_s if step_s is None else step_s
-        orbit, spacecraft = self.filter.orbit or self.orbit, self.filter.spacecraft or self.spacecraft
-        leader = self.leader_spacecraft or spacecraft
-        return discretise(get_dynamics(name), step_s, orbit, spacecraft, leader)
+        belief, step_s = self.belief, self.dt_s if step_s is None else step_s
+        leader = self.leader_spacecraft or belief.spacecraft
+        return discretise(get_dynamics(belief.dynamics), step_s, belief.orbit, belief.spacecraft, leader)
 
 
 MAX_STEPS = 1_000_000

@@ -14,7 +14,7 @@ from formation_env.dynamics.base import Array
 from formation_env.fastmath import log, to_bits, to_integer
 from formation_env.jit import LANES, lane
 from formation_env.kernel import tile as f
-from formation_env.kernel.packing import Belief, Model, Scalars
+from formation_env.kernel.packing import Noises, Model, Scalars
 
 # Offsets of the schedule's columns and of the observation's blocks, as the compiler needs them: constants.
 REFERENCE: Final = f.plan("reference")
@@ -137,7 +137,7 @@ def dropout(t: Array, i: int, c: Scalars) -> None:
 
 
 @lane
-def filter_time_update(t: Array, i: int, model: Model, belief: Belief) -> None:
+def filter_time_update(t: Array, i: int, model: Model, belief: Noises) -> None:
     """The estimate and its covariance over one step (Ma 2009, eq. 4.74-4.75)."""
     ax, ay, az = t[f.COMMAND + i], t[f.COMMAND + LANES + i], t[f.COMMAND + 2 * LANES + i]
     _propagate(t, i, f.ESTIMATE, model, ax, ay, az)
@@ -151,7 +151,7 @@ def filter_time_update(t: Array, i: int, model: Model, belief: Belief) -> None:
 
 
 @lane
-def filter_measurement_update(t: Array, i: int, belief: Belief, c: Scalars) -> None:
+def filter_measurement_update(t: Array, i: int, belief: Noises, c: Scalars) -> None:
     """Measure the true state and take in what arrives (Ma 2009, eq. 4.71-4.73)."""
     n, truth, x = FIRST_SENSOR_NOISE + i, f.TRUTH + i, f.ESTIMATE + i
     received = (belief.measures[0] * t[f.MEASURED + i], belief.measures[1] * t[f.MEASURED + i])

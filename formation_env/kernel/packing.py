@@ -27,7 +27,7 @@ class Model(NamedTuple):
     delta_cross_track: Any  # 2
 
 
-class Belief(NamedTuple):
+class Noises(NamedTuple):
     """The noises that the filter believes in."""
 
     Q_in_plane: Any  # 10
@@ -69,12 +69,12 @@ class Scalars(NamedTuple):
 to_fixed_tuple: Any = numba_arrays.to_fixed_tuple
 
 MODEL_SIZE: Final = 36
-BELIEF_SIZE: Final = 18
+NOISES_SIZE: Final = 18
 SCALAR_SIZE: Final = len(Scalars._fields)
 
 
 def pack(scenario: Scenario) -> Array:
-    """Settings (2 * MODEL_SIZE + BELIEF_SIZE + SCALAR_SIZE,).
+    """Settings (2 * MODEL_SIZE + NOISES_SIZE + SCALAR_SIZE,).
 
     Raises:
         ValueError: a dynamics model couples the orbit plane and the cross-track axis.
@@ -84,9 +84,9 @@ def pack(scenario: Scenario) -> Array:
 
 
 @lane
-def unpack(s: Array) -> tuple[Model, Model, Belief, Scalars]:
+def unpack(s: Array) -> tuple[Model, Model, Noises, Scalars]:
     """The settings as tuples of scalars, so that the compiler need not read memory to know them."""
-    belief = Belief(
+    belief = Noises(
         to_fixed_tuple(s[72:82], 10),
         to_fixed_tuple(s[82:85], 3),
         to_fixed_tuple(s[85:87], 2),
@@ -123,27 +123,20 @@ def _model(model: DiscreteModel) -> Model:
     )
 
 
-def _or(value: float | None, default: float) -> float:
-    return default if value is None else value
-
-
-def _belief(scenario: Scenario) -> Belief:
-    believed, sensor = scenario.filter, scenario.sensor
-    noise = _or(believed.process_noise_m_s2, scenario.process_noise_m_s2)
-    Q_noise = process_noise_covariance(scenario.filter_model().Gamma, noise)
-    sigma_pos = _or(believed.sigma_pos_m, sensor.sigma_pos_m)
-    sigma_vel = _or(believed.sigma_vel_m_s, sensor.sigma_vel_m_s)
-    return Belief(
+def _belief(scenario: Scenario) -> Noises:
+    believed = scenario.belief
+    Q_noise = process_noise_covariance(scenario.filter_model().Gamma, believed.process_noise_m_s2)
+    return Noises(
         Q_in_plane=upper_triangle(Q_noise[np.ix_(IN_PLANE, IN_PLANE)]),
         Q_cross_track=upper_triangle(Q_noise[np.ix_(CROSS_TRACK, CROSS_TRACK)]),
-        variances=(sigma_pos**2, sigma_vel**2),
-        thrust=(_or(believed.thrust_noise, scenario.spacecraft.thrust_noise) ** 2,),
-        measures=(1.0, float(sensor.measures == "position_and_velocity")),
+        variances=(believed.sigma_pos_m**2, believed.sigma_vel_m_s**2),
+        thrust=(believed.thrust_noise**2,),
+        measures=(1.0, float(scenario.sensor.measures == "position_and_velocity")),
     )
 
 
 def _scalars(scenario: Scenario) -> Scalars:
-    start, believed, reward = scenario.start, scenario.filter, scenario.reward
+    start, believed, reward = scenario.start, scenario.belief, scenario.reward
     chain = scenario.dropout.chain(scenario.dt_s, scenario.orbit)
     layout = observation_layout(scenario)
     return Scalars(
@@ -157,8 +150,8 @@ def _scalars(scenario: Scenario) -> Scalars:
         sigma_vel=scenario.sensor.sigma_vel_m_s,
         spread_pos=start.spread_pos_m,
         spread_vel=start.spread_vel_m_s,
-        initial_variance_pos=_or(believed.initial_sigma_pos_m, start.spread_pos_m) ** 2,
-        initial_variance_vel=_or(believed.initial_sigma_vel_m_s, start.spread_vel_m_s) ** 2,
+        initial_variance_pos=believed.initial_sigma_pos_m**2,
+        initial_variance_vel=believed.initial_sigma_vel_m_s**2,
         link_loss=chain.stationary_loss,
         link_fail=chain.fail,
         link_recover=chain.recover,

@@ -47,13 +47,13 @@ def _move(t: Array, lane_set: LaneSet, truth: packing.Model, c: packing.Scalars)
 
 
 @stage
-def _predict(t: Array, lane_set: LaneSet, believed: packing.Model, belief: packing.Belief) -> None:
+def _predict(t: Array, lane_set: LaneSet, believed: packing.Model, belief: packing.Noises) -> None:
     for i in range(len(lane_set)):
         lanes.filter_time_update(t, i, believed, belief)
 
 
 @stage
-def _measure(t: Array, lane_set: LaneSet, belief: packing.Belief, c: packing.Scalars) -> None:
+def _measure(t: Array, lane_set: LaneSet, belief: packing.Noises, c: packing.Scalars) -> None:
     for i in range(len(lane_set)):
         lanes.dropout(t, i, c)
     for i in range(len(lane_set)):
