@@ -14,7 +14,7 @@ from formation_env.dynamics.base import Array
 from formation_env.fastmath import log, to_bits, to_integer
 from formation_env.jit import LANES, lane
 from formation_env.kernel import tile as f
-from formation_env.kernel.packing import Noises, Model, Scalars
+from formation_env.kernel.packing import Model, Noises, Scalars
 
 # Offsets of the schedule's columns and of the observation's blocks, as the compiler needs them: constants.
 REFERENCE: Final = f.plan("reference")
