@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from formation_env.dynamics.base import Array
+from formation_env.fastmath import fma
 from formation_env.jit import lane
 from formation_env.orbit import Orbit
 from formation_env.settings import NonNegative, Text, settings
@@ -108,20 +109,21 @@ def time_update_2(P: Symmetric2, Phi: Matrix2, Q_noise: Symmetric2) -> Symmetric
 
 
 @lane
-def _times_symmetric(a: float, b: float, c: float, d: float, P: Symmetric4) -> State4:
-    """Row vector times symmetric matrix."""
-    p00, p01, p02, p03, p11, p12, p13, p22, p23, p33 = P
-    return (
-        a * p00 + b * p01 + c * p02 + d * p03,
-        a * p01 + b * p11 + c * p12 + d * p13,
-        a * p02 + b * p12 + c * p22 + d * p23,
-        a * p03 + b * p13 + c * p23 + d * p33,
-    )
+def _dot(u: State4, a: float, b: float, c: float, d: float) -> float:
+    return fma(u[0], a, fma(u[1], b, fma(u[2], c, u[3] * d)))
 
 
 @lane
-def _dot(u: State4, a: float, b: float, c: float, d: float) -> float:
-    return u[0] * a + u[1] * b + u[2] * c + u[3] * d
+def _times_symmetric(a: float, b: float, c: float, d: float, P: Symmetric4) -> State4:
+    """Row vector times symmetric matrix."""
+    p00, p01, p02, p03, p11, p12, p13, p22, p23, p33 = P
+    row = (a, b, c, d)
+    return (
+        _dot(row, p00, p01, p02, p03),
+        _dot(row, p01, p11, p12, p13),
+        _dot(row, p02, p12, p22, p23),
+        _dot(row, p03, p13, p23, p33),
+    )
 
 
 @lane
@@ -210,12 +212,12 @@ def measure_first(
         rest * (p01 - k1 * p00) + k0 * k1 * variance,
         rest * (p02 - k2 * p00) + k0 * k2 * variance,
         rest * (p03 - k3 * p00) + k0 * k3 * variance,
-        p11 - k1 * p01,
-        p12 - k1 * p02,
-        p13 - k1 * p03,
-        p22 - k2 * p02,
-        p23 - k2 * p03,
-        p33 - k3 * p03,
+        fma(-k1, p01, p11),
+        fma(-k1, p02, p12),
+        fma(-k1, p03, p13),
+        fma(-k2, p02, p22),
+        fma(-k2, p03, p23),
+        fma(-k3, p03, p33),
     )
     return new_x, new_P, innovation * innovation * weight
 

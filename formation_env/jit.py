@@ -14,7 +14,8 @@ F = TypeVar("F", bound=Callable[..., Any])
 LANES: Final = 32
 """Rows of one tile: a compile-time constant, a multiple of every vector width."""
 
-# Strict IEEE arithmetic, no fused multiply-adds: a row's results are the same bits in a vector and alone.
+# Strict IEEE arithmetic, fused multiply-adds only where `fma` is written: a row's results are the same bits in a vector
+# and alone.
 FAST_MATH: Final = False
 
 
