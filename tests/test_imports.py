@@ -13,7 +13,7 @@ PACKAGES = ("formation_env", "baselines", "agents")
 # Each package may import itself and those before it.
 # Inside formation_env each line may import itself and the lines above; a new module takes its place here.
 LAYERS = (
-    {"constants", "settings", "seeds", "files", "jit", "fastmath", "streams", "orbit", "spacecraft"},
+    {"constants", "settings", "seeds", "files", "jit", "fastmath", "forces", "streams", "orbit", "spacecraft"},
     {"dynamics", "formations", "dropout", "estimation", "propagation"},
     {"scenario", "observation", "schedule"},
     {"kernel"},
