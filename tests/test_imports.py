@@ -13,7 +13,8 @@ PACKAGES = ("formation_env", "baselines", "agents")
 # Each package may import itself and those before it.
 # Inside formation_env each line may import itself and the lines above; a new module takes its place here.
 LAYERS = (
-    {"constants", "settings", "seeds", "files", "jit", "fastmath", "forces", "streams", "orbit", "spacecraft"},
+    {"constants", "settings", "seeds", "files", "jit", "fastmath", "streams", "spacecraft"},
+    {"atmosphere", "elements", "ephemeris", "forces", "frames", "gauss", "kepler", "orbit"},
     {"dynamics", "formations", "dropout", "estimation", "propagation"},
     {"scenario", "observation", "schedule"},
     {"kernel"},
