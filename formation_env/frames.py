@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from formation_env.constants import OMEGA_EARTH
-from formation_env.elements import Elements, orbital_axes
+from formation_env.elements import Elements, orbital_axes, unit
 
 Array: TypeAlias = NDArray[np.float64]
 State: TypeAlias = tuple[Array, Array]
@@ -71,7 +71,7 @@ def lvlh_axes(position: ArrayLike, velocity: ArrayLike) -> Array:
         Rows are the axes (..., 3, 3): the matrix takes ECI vectors to LVLH.
     """
     r = np.asarray(position, float)
-    radial, normal = _unit(r), _unit(np.cross(r, np.asarray(velocity, float)))
+    radial, normal = unit(r), unit(np.cross(r, np.asarray(velocity, float)))
     return np.stack([radial, np.cross(normal, radial), normal], axis=-2)
 
 
@@ -189,9 +189,3 @@ def _undo(axes: Array, components: ArrayLike) -> Array:
     """The vector (..., 3) of given components along the axes."""
     vector: Array = np.einsum("...ij,...i->...j", axes, np.asarray(components, float))
     return vector
-
-
-def _unit(vector: Array) -> Array:
-    """Vectors of length one along given ones."""
-    unit: Array = vector / np.linalg.norm(vector, axis=-1, keepdims=True)
-    return unit

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
 from formation_env.constants import MU_EARTH
-from formation_env.elements import Elements, to_cartesian, to_elements
+from formation_env.elements import Elements, to_cartesian, to_elements, unit
 from formation_env.kepler import elliptic
 
 Array: TypeAlias = NDArray[np.float64]
@@ -118,13 +118,14 @@ def propagate_elements(
 def _vectors(position: Array, velocity: Array) -> Array:
     """Angular momentum, eccentricity vector and radial direction (3, ..., 3)."""
     h = np.cross(position, velocity)
-    direction = position / np.linalg.norm(position, axis=-1, keepdims=True)
+    direction = unit(position)
     return np.stack([h, np.cross(velocity, h) / MU_EARTH - direction, direction])
 
 
 def _cartesian(vectors: Array) -> tuple[Array, Array]:
     """Position and velocity (..., 3) of the vectors (3, ..., 3)."""
     h, e, direction = vectors
+    direction = unit(direction)  # the integrator leaves its length to its tolerance
     p = np.sum(h**2, axis=-1, keepdims=True) / MU_EARTH
     # r = p / (1 + e . u) u, v = h x (e + u) / p
     return p / (1 + np.sum(e * direction, axis=-1, keepdims=True)) * direction, np.cross(h, e + direction) / p
