@@ -131,9 +131,8 @@ def spherical_to_cartesian(coordinates: ArrayLike, rates: ArrayLike) -> State:
         coordinates: radius, longitude, latitude (..., 3), m and rad.
         rates: theirs (..., 3), m/s and rad/s.
     """
-    (r, theta, phi), (r_rate, theta_rate, phi_rate) = (
-        np.moveaxis(np.asarray(vector, float), -1, 0) for vector in (coordinates, rates)
-    )
+    vectors = np.broadcast_arrays(np.asarray(coordinates, float), np.asarray(rates, float))
+    (r, theta, phi), (r_rate, theta_rate, phi_rate) = (np.moveaxis(vector, -1, 0) for vector in vectors)
     zero = np.zeros_like(theta)
     # r' = r' u_r + r theta' cos phi u_theta + r phi' u_phi
     up = np.stack([np.cos(phi) * np.cos(theta), np.cos(phi) * np.sin(theta), np.sin(phi)], axis=-1)
