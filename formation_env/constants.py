@@ -17,7 +17,7 @@ OMEGA_EARTH: Final = 7.292115e-5
 MU_SUN: Final = 1.32712440018e20
 """Gravitational parameter of the Sun, m^3/s^2."""
 
-MU_MOON: Final = 4.9048695e12
+MU_MOON: Final = 4.9028001e12
 """Gravitational parameter of the Moon, m^3/s^2."""
 
 AU_M: Final = 1.495978707e11

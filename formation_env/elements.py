@@ -170,6 +170,12 @@ def mean_radius_m(
     return r_mean
 
 
+def unit(vector: Array) -> Array:
+    """Vectors (..., 3) of length one along given ones."""
+    direction: Array = vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+    return direction
+
+
 def _node_axes(normal: Array) -> tuple[Array, Array]:
     """Unit vectors in the orbit plane: to the ascending node (to x if there is none), and a quarter turn on."""
     sine = np.hypot(normal[..., 0], normal[..., 1])

@@ -39,8 +39,9 @@ def solve_kepler(mean_anomaly_rad: ArrayLike, eccentricity: ArrayLike) -> Array:
         ValueError: an eccentricity outside [0, 1).
     """
     mean, e = np.broadcast_arrays(np.asarray(mean_anomaly_rad, float), elliptic(eccentricity))
-    folded = np.remainder(mean + np.pi, 2 * np.pi) - np.pi
-    M = np.abs(folded)
+    # in [-pi, pi], and exact where M is small
+    folded = mean - 2 * np.pi * np.round(mean / (2 * np.pi))
+    M = np.minimum(np.abs(folded), np.pi)
     # E (1 - e) <= M and e E^3 / pi^2 <= M, as E - sin E >= E^3 / pi^2 on [0, pi]; below e = 0.3 the first is closer
     cubic = np.cbrt(np.pi**2 * M / np.maximum(e, 0.1))
     E: Array = np.minimum.reduce([M + e, M / (1 - e), cubic, np.full_like(M, np.pi)])
