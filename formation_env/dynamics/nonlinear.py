@@ -16,11 +16,12 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from formation_env import forces
-from formation_env.constants import MU_MOON, MU_SUN
+from formation_env.atmosphere import exponential_density_kg_m3
+from formation_env.constants import MU_MOON, MU_SUN, R_EARTH
 from formation_env.dynamics.base import Array
 from formation_env.elements import to_cartesian
 from formation_env.ephemeris import moon_position_m, sun_position_m
-from formation_env.frames import lvlh_frame
+from formation_env.frames import eci_to_lvlh, lvlh_frame, lvlh_to_eci
 from formation_env.orbit import Orbit
 from formation_env.perturbations import Perturbations
 from formation_env.spacecraft import Spacecraft
@@ -49,11 +50,11 @@ class World:
     orbit: Orbit
     perturbations: Perturbations
 
-    def density(self, position: Array) -> Array:
-        """Relative density of the air (...) at positions (..., 3); 1 at the leader's altitude (Ma 2009, eq. 2.30)."""
-        height_m = np.linalg.norm(position, axis=-1) - self.orbit.semi_major_axis_m
-        scale = self.perturbations.scale_height_m
-        return np.ones_like(height_m) if scale is None else np.exp(-height_m / scale)
+    def density_kg_m3(self, position: Array, craft: Spacecraft) -> Array:
+        """Density of the air (...) at positions (..., 3); a spacecraft states it for the leader's altitude."""
+        altitude_m = np.linalg.norm(position, axis=-1) - R_EARTH
+        scale_m = self.perturbations.scale_height_m or np.inf
+        return exponential_density_kg_m3(altitude_m, craft.air_density_kg_m3, self.orbit.altitude_m, scale_m)
 
     def sun_and_moon(self, times_s: Any) -> tuple[Array, Array]:
         """Their positions (..., 3) at times (...), m."""
@@ -72,7 +73,7 @@ class World:
         (x, y, z), (vx, vy, vz), on = np.moveaxis(position, -1, 0), np.moveaxis(velocity, -1, 0), self.perturbations
         parts = [forces.gravity(x, y, z, self.orbit.j2_coefficient)]
         if on.drag:
-            density = craft.air_density_kg_m3 * self.density(position)
+            density = self.density_kg_m3(position, craft)
             parts.append(forces.drag(vx, vy, vz, density, craft.drag_area_per_mass_m2_kg))
         if on.far_bodies:
             (sx, sy, sz), (mx, my, mz) = (np.moveaxis(body, -1, 0) for body in self.sun_and_moon(times_s))
@@ -83,25 +84,28 @@ class World:
         return np.moveaxis(np.array(parts).sum(axis=0), 0, -1)
 
 
-def fly(world: World, craft: Spacecraft, state: Array, times_s: Array) -> Array:
-    """Coast in ECI from a state at t = 0 (Dormand & Prince's method of order 8).
+def coast(world: World, craft: Spacecraft, states: Array, times_s: Array) -> Array:
+    """Fly without thrust in ECI (Dormand & Prince's method of order 8).
 
     Args:
         world: what acts.
         craft: the spacecraft.
-        state: position and velocity (6,), m and m/s.
+        states: positions and velocities (N, 6) at t = 0, m and m/s.
         times_s: times (T,), s, all of one sign and sorted away from 0.
 
     Returns:
-        States (T, 6).
+        States (T, N, 6).
     """
 
     def rates(time_s: float, y: Array) -> Array:
-        return np.concatenate([y[3:], world.acceleration(time_s, y[:3], y[3:], craft)])
+        position, velocity = np.split(y.reshape(-1, 6), 2, axis=1)
+        return np.hstack([velocity, world.acceleration(time_s, position, velocity, craft)]).ravel()
 
+    if times_s[-1] == 0:
+        return np.broadcast_to(states, (len(times_s), *states.shape))
     span = (0.0, float(times_s[-1]))
-    solution = solve_ivp(rates, span, state, "DOP853", times_s, rtol=TOLERANCE, atol=1e-9)
-    return np.asarray(solution.y.T)
+    solution = solve_ivp(rates, span, states.ravel(), "DOP853", times_s, rtol=TOLERANCE, atol=1e-9)
+    return np.asarray(solution.y.T).reshape(len(times_s), -1, 6)
 
 
 @dataclass(frozen=True)
@@ -122,16 +126,40 @@ class Leader:
     axes: Array
     rotation: Array
 
+    @property
+    def motion(self) -> tuple[Array, Array, Array]:
+        """Position, velocity, and acceleration along the orbit normal (T,): what the frames need."""
+        return self.position, self.velocity, np.vecdot(self.acceleration, self.axes[:, 2])
+
 
 def leader_path(world: World, craft: Spacecraft, times_s: Array) -> Leader:
-    """The leader at times (T,), s, sorted, from 0 on."""
-    states = fly(world, craft, np.concatenate(to_cartesian(world.orbit.elements)), times_s)
-    position, velocity = states[:, :3], states[:, 3:]
+    """The leader at times (T,), s, all of one sign and sorted away from 0."""
+    states = coast(world, craft, np.concatenate(to_cartesian(world.orbit.elements))[None], times_s)
+    position, velocity = np.split(states[:, 0], 2, axis=1)
     acceleration = world.acceleration(times_s, position, velocity, craft)
     normal = np.cross(position, velocity)
-    normal_accel = np.vecdot(acceleration, normal) / np.linalg.norm(normal, axis=-1)
-    axes, rotation = lvlh_frame(position, velocity, normal_accel)
+    axes, rotation = lvlh_frame(position, velocity, np.vecdot(acceleration, normal) / np.linalg.norm(normal, axis=-1))
     return Leader(position, velocity, acceleration, axes, rotation)
+
+
+def relative_path(world: World, follower: Spacecraft, leader: Spacecraft, states: Array, times_s: Array) -> Array:
+    """Followers that do not thrust.
+
+    Args:
+        world: what acts.
+        follower: each follower.
+        leader: the leader.
+        states: LVLH states (N, 6) at t = 0, m and m/s.
+        times_s: times (T,), s, all of one sign and sorted away from 0.
+
+    Returns:
+        LVLH states (T, N, 6).
+    """
+    start, path = leader_path(world, leader, np.zeros(1)), leader_path(world, leader, times_s)
+    inertial = np.hstack(lvlh_to_eci(states[:, :3], states[:, 3:], *start.motion))
+    flown = coast(world, follower, inertial, times_s)
+    leaders = (part[:, None] for part in path.motion)
+    return np.concatenate(eci_to_lvlh(flown[..., :3], flown[..., 3:], *leaders), axis=-1)
 
 
 def substeps(dt_s: float) -> int:
