@@ -36,7 +36,7 @@ def eci_to_lvlh(
     Returns:
         Position x radial (outward), y along-track, z along the orbit normal, and its rate.
     """
-    axes, omega = _lvlh(leader_position, leader_velocity, normal_accel_m_s2)
+    axes, omega = lvlh_frame(leader_position, leader_velocity, normal_accel_m_s2)
     relative = _apply(axes, np.subtract(position, leader_position))
     rate = _apply(axes, np.subtract(velocity, leader_velocity))
     return relative, rate - np.cross(omega, relative)
@@ -58,7 +58,7 @@ def lvlh_to_eci(
         leader_velocity: ECI, m/s.
         normal_accel_m_s2: the leader's acceleration along its orbit normal (...), m/s^2; 0 for two bodies.
     """
-    axes, omega = _lvlh(leader_position, leader_velocity, normal_accel_m_s2)
+    axes, omega = lvlh_frame(leader_position, leader_velocity, normal_accel_m_s2)
     relative = np.asarray(relative_position, float)
     rate = np.add(relative_velocity, np.cross(omega, relative))
     return np.add(leader_position, _undo(axes, relative)), np.add(leader_velocity, _undo(axes, rate))
@@ -160,7 +160,7 @@ def orbital_to_eci(position: ArrayLike, velocity: ArrayLike, elements: Elements)
     return _undo(axes, position), _undo(axes, velocity)
 
 
-def _lvlh(position: ArrayLike, velocity: ArrayLike, normal_accel: ArrayLike) -> tuple[Array, Array]:
+def lvlh_frame(position: ArrayLike, velocity: ArrayLike, normal_accel: ArrayLike) -> tuple[Array, Array]:
     """LVLH axes (..., 3, 3) of a leader and their angular velocity (..., 3) in LVLH, rad/s."""
     momentum = np.cross(np.asarray(position, float), np.asarray(velocity, float))
     r, h = np.linalg.norm(position, axis=-1), np.linalg.norm(momentum, axis=-1)

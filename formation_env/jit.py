@@ -37,4 +37,5 @@ def stage(function: F) -> F:
 
 def shared(function: F) -> F:
     """Leave a function of scalars or arrays to Python as it is, and inline it where compiled code calls it."""
-    return cast(F, register_jitable(**_ARITHMETIC, forceinline=True)(function))
+    wrapped: F = register_jitable(**_ARITHMETIC, forceinline=True)(function)
+    return wrapped

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from formation_env.dynamics import discretise, get_dynamics
+from formation_env.dynamics import get_dynamics
 from formation_env.dynamics.base import Array
 from formation_env.orbit import Orbit
 from formation_env.spacecraft import Spacecraft
@@ -43,6 +43,6 @@ def propagate(
     leader = leader_spacecraft or follower
     if leader.air_density_kg_m3 != follower.air_density_kg_m3:
         raise ValueError("leader_spacecraft.air_density_kg_m3: must be the follower's, they fly through the same air")
-    model = discretise(get_dynamics(dynamics), times, orbit or Orbit(), follower, leader)
+    model = get_dynamics(dynamics).discretise(0.0, times, orbit or Orbit(), follower, leader)
     path: Array = np.einsum("tij,...j->...ti", model.Phi, states) + model.delta
     return path
