@@ -7,12 +7,11 @@ Legend: nu true anomaly, u = argument of perigee + nu, p = a (1 - e^2), n mean m
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from formation_env.constants import J2, MU_EARTH, R_EARTH
-from formation_env.kepler import elliptic
+from formation_env.kepler import Array, elliptic
 
-Array: TypeAlias = NDArray[np.float64]
 Values: TypeAlias = float | Array
 
 UNDEFINED = 1e-13

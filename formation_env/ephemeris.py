@@ -1,6 +1,6 @@
 """Where the Sun and the Moon are (ECI), for their pull and the Sun's light (Ma 2009, eq. 2.34-2.41).
 
-Axes are those of the mean equator and equinox J2000 (GCRS); good between 1900 and 2100.
+Axes are those of the mean equator and equinox J2000 (GCRS). Dates outside 1900-2100 make ERFA warn.
 """
 
 from typing import TypeAlias
@@ -17,7 +17,7 @@ DAY_S = 86400.0
 
 
 def sun_position_m(julian_date: ArrayLike, elapsed_s: ArrayLike = 0.0) -> Array:
-    """Geometric position of the Sun (VSOP2000 by ERFA's epv00: 5 km at worst in 1900-2100).
+    """Geometric position of the Sun (VSOP2000 by ERFA's epv00: 11 km off DE405 at worst, 1900-2100).
 
     Args:
         julian_date: an epoch (...), TDB, days.
@@ -32,7 +32,7 @@ def sun_position_m(julian_date: ArrayLike, elapsed_s: ArrayLike = 0.0) -> Array:
 
 
 def moon_position_m(julian_date: ArrayLike, elapsed_s: ArrayLike = 0.0) -> Array:
-    """Position of the Moon (Meeus 1998, chapter 47, by ERFA's moon98: about 10 arc seconds and 20 km).
+    """Position of the Moon (Meeus 1998, chapter 47, by ERFA's moon98: 32 km off ELP/MPP02 at worst, 1950-2100).
 
     Args:
         julian_date: an epoch (...), TDB, days.

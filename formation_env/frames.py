@@ -7,12 +7,12 @@ Earth's axis. A velocity is the rate of change of that frame's coordinates, so r
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from formation_env.constants import OMEGA_EARTH
 from formation_env.elements import Elements, orbital_axes, unit
+from formation_env.kepler import Array
 
-Array: TypeAlias = NDArray[np.float64]
 State: TypeAlias = tuple[Array, Array]
 """Position (..., 3), m, and velocity (..., 3), m/s."""
 

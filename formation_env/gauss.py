@@ -8,14 +8,13 @@ from collections.abc import Callable
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 
 from formation_env.constants import MU_EARTH
 from formation_env.elements import Elements, to_cartesian, to_elements, unit
-from formation_env.kepler import elliptic
+from formation_env.kepler import Array, elliptic
 
-Array: TypeAlias = NDArray[np.float64]
 Perturbation: TypeAlias = Callable[[float, Array, Array], ArrayLike]
 """Time, s, ECI position (..., 3), m, and velocity (..., 3), m/s -> ECI acceleration (..., 3), m/s^2."""
 

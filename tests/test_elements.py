@@ -44,6 +44,13 @@ def test_kepler_equation_near_a_parabola() -> None:
     np.testing.assert_allclose(solve_kepler(M, 1 - 1e-15), np.cbrt(6 * M), rtol=1e-3)
 
 
+def test_kepler_equation_is_solved_all_over() -> None:
+    """A dense grid of half a revolution and up to e = 1 - 1e-15 has no gap; rounding of terms of up to pi."""
+    M, e = np.meshgrid(np.geomspace(1e-12, math.pi, 300), 1 - np.geomspace(1e-15, 1, 100))
+    E = solve_kepler(M, e)
+    np.testing.assert_allclose(E - e * np.sin(E), M, rtol=0, atol=2e-15)
+
+
 def test_kepler_equation_against_spice() -> None:
     """The solver of NASA's SPICE, on a grid; both solve to rounding, which 1 - e = 0.11 enlarges tenfold."""
     M, e = np.meshgrid(np.linspace(-7, 7, 15), [0.0, 0.1, 0.5, 0.89])
@@ -140,6 +147,13 @@ def test_undefined_angles_are_zero_and_the_next_takes_over(name: str) -> None:
     assert_angles_equal(found[3:], expected, atol=1e-14)
     zero = [angle == 0 for angle in found[3:]]
     assert zero == [angle == 0 for angle in expected]
+
+
+def test_angles_stay_below_a_turn() -> None:
+    """Just before perigee, the node and the x axis: an angle of -1e-20 rounds to a whole turn, which is 0."""
+    position, velocity = to_cartesian(Elements(7e6, 0.1, 0.5, 0.0, 0.0, 0.0))
+    found = np.array(to_elements(position - [0, 1e-13, 0], velocity)[3:])
+    assert np.all((found >= 0) & (found < 2 * math.pi))
 
 
 def test_elements_take_any_leading_shape() -> None:

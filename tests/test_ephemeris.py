@@ -71,7 +71,7 @@ def test_places_of_vallado(body: str) -> None:
 
 @pytest.mark.parametrize(("place", "speed_m_s"), [(sun_position_m, 30.3e3), (moon_position_m, 1.0e3)])
 def test_elapsed_time_is_fine_grained(place: Callable[..., Array], speed_m_s: float) -> None:
-    """Steps of 1 ms, lost in a Julian date of 40 microseconds' grain, move a body evenly at its speed (5 %).
+    """Steps of 1 ms, lost in a Julian date of 40 microseconds' grain, move a body evenly at its mean speed (10 %).
 
     The Moon's distance of 4e8 m and the Sun's of 1.5e11 m are doubles of 6e-8 m and 3e-5 m grain, and their angles of
     a few times that.
