@@ -142,7 +142,7 @@ def two_impulse_path(scenario: Scenario, leg: Leg) -> Array:
 def hohmann_path(scenario: Scenario, leg: Leg) -> Array:
     """The coasting path of half a period to the reference, then the reference to the arrival, states (steps + 1, 6).
 
-    Where the target is due at another place than a Hohmann transfer ends, a radial part of the impulses makes up for it.
+    Where the target is due at another place than Hohmann's ellipse ends, a radial part of the impulses makes up for it.
 
     Raises:
         ConfigError: the transfer is shorter than half a period, or not in one plane.
