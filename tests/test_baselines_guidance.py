@@ -201,6 +201,7 @@ SLOW = {"velocity_s2": [1e4, 1e4, 1e4], "control_s2": [1e2, 1e2, 1e2]}
 CONTROLLERS: dict[str, dict[str, Any]] = {
     "lqr": {"design": "weights"},
     "lqr_tracking": {"hold": SLOW, "transfer": SLOW},
+    "lqr_tracking integrated": {"hold": SLOW, "transfer": SLOW, "feedforward": "integrated"},
     "smc": {},
 }
 
@@ -214,7 +215,7 @@ def test_every_controller_flies_every_guide(name: str, guide: str) -> None:
     """
     scenario = noise_free("initialization")
     gains = {**CONTROLLERS[name], "guidance": guide}
-    flown = evaluate(make_policy(name, scenario, gains), scenario, [0]).iloc[0]
+    flown = evaluate(make_policy(name.split()[0], scenario, gains), scenario, [0]).iloc[0]
     speed = 2000 / (0.5 * scenario.orbit.period_s)
     line = 2 * speed + 2 * scenario.orbit.mean_motion_rad_s * 2000
     assert flown["position_error_mean_m"] < 200

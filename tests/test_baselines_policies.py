@@ -126,6 +126,7 @@ FAULTS = {
     "lqr:\n  guidence: automatic\n": ("lqr", "guidence: unknown key; did you mean 'guidance'?"),
     "lqr:\n  guidance: curved\n": ("lqr", "guidance"),
     "lqr:\n  guidance: straight_line\n": ("lqr", "guidance: must be automatic with design expected_cost"),
+    "lqr_tracking:\n  feedforward: static\n": ("lqr_tracking", "feedforward"),
     "smc:\n  reaching: {kind: fast}\n": ("smc", "reaching.kind"),
     "smc:\n  reaching: {kind: power, alpha: 2}\n": ("smc", "reaching.alpha"),
     "smc:\n  surface: {kind: placed, decay_per_s: '1e-3'}\n": ("smc", "surface.decay_per_s"),
