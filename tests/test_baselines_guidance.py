@@ -203,6 +203,7 @@ CONTROLLERS: dict[str, dict[str, Any]] = {
     "lqr_tracking": {"hold": SLOW, "transfer": SLOW},
     "lqr_tracking integrated": {"hold": SLOW, "transfer": SLOW, "feedforward": "integrated"},
     "smc": {},
+    "smc relay": {"reaching": {"kind": "relay", "u0_m_s2": 0.004}, "boundary_m": 200.0},
 }
 
 

@@ -128,6 +128,7 @@ FAULTS = {
     "lqr:\n  guidance: straight_line\n": ("lqr", "guidance: must be automatic with design expected_cost"),
     "lqr_tracking:\n  feedforward: static\n": ("lqr_tracking", "feedforward"),
     "smc:\n  reaching: {kind: fast}\n": ("smc", "reaching.kind"),
+    "smc:\n  reaching: {kind: relay, u0_m_s2: 0}\n": ("smc", "reaching.u0_m_s2"),
     "smc:\n  reaching: {kind: power, alpha: 2}\n": ("smc", "reaching.alpha"),
     "smc:\n  surface: {kind: placed, decay_per_s: '1e-3'}\n": ("smc", "surface.decay_per_s"),
     "smc:\n  boundary_m: ten\n": ("smc", "boundary_m"),
