@@ -14,6 +14,7 @@ from typing import Final
 
 import numpy as np
 
+from baselines.kalman import measurement
 from baselines.riccati import OVERLOAD, time_varying_gains
 from baselines.timeline import start_error
 from formation_env.dynamics.base import Array, DiscreteModel
@@ -43,8 +44,7 @@ class Knowledge:
 def knowledge(scenario: Scenario, model: DiscreteModel) -> Knowledge:
     """The filter's covariances over an episode in which all measurements arrive (Ma 2009, eq. 4.71-4.75)."""
     belief, start = scenario.belief, scenario.start
-    H = np.eye(6) if scenario.sensor.measures == "position_and_velocity" else np.eye(3, 6)
-    R_noise = np.diag(np.repeat([belief.sigma_pos_m, belief.sigma_vel_m_s], 3) ** 2)[: len(H), : len(H)]
+    H, R_noise = measurement(scenario)
     P = np.diag(np.repeat([start.spread_pos_m, start.spread_vel_m_s], 3) ** 2)
     Q_noise = process_noise_covariance(model.Gamma, belief.process_noise_m_s2)
     missed, learned = np.zeros((2, scenario.num_steps + 1, 6, 6))
