@@ -5,7 +5,8 @@ a quadratic cost has the same sum, and its minimum moves towards the least E|u| 
 doi 10.1002/cpa.20303, for sums without expectation). The rms values follow from the nominal start, its spread, and the
 noises, as if no measurement were lost.
 
-Legend: Phi, Gamma model; K gain; P covariance of the estimate's error, X of the estimate; S innovation covariance.
+Legend: Phi, Gamma model; K gain (the filter's in `knowledge`); P covariance of the estimate's error, X of the estimate;
+S innovation covariance.
 """
 
 from dataclasses import dataclass
@@ -50,8 +51,11 @@ def knowledge(scenario: Scenario, model: DiscreteModel) -> Knowledge:
     missed, learned = np.zeros((2, scenario.num_steps + 1, 6, 6))
     for step in range(scenario.num_steps + 1):
         S = H @ P @ H.T + R_noise
-        learned[step] = P @ H.T @ np.linalg.pinv(S, hermitian=True) @ H @ P
-        missed[step] = P - learned[step]
+        K = P @ H.T @ np.linalg.pinv(S, hermitian=True)
+        learned[step] = K @ S @ K.T
+        # Joseph's form: P - K S K' is not positive where a sensor without noise leaves nothing
+        rest = np.eye(6) - K @ H
+        missed[step] = rest @ P @ rest.T + K @ R_noise @ K.T
         P = model.Phi @ missed[step] @ model.Phi.T + Q_noise
     return Knowledge(missed, learned)
 

@@ -117,8 +117,8 @@ WRONG = {
 def test_a_wrong_model_shows_in_the_innovations(case: str) -> None:
     """NIS of 256 rows at every instant against the mean that linear theory gives: 6 with the right model, else more.
 
-    The leader's orbit is believed 20 km too high, so n is 0.4 % too low. The band is 5 standard errors of the rows' scatter; of
-    121 values a correct program has one outside with probability 1e-4.
+    The leader's orbit is believed 20 km too high, so n is 0.4 % too low. The band is 5 standard errors of the rows'
+    scatter; of 121 values a correct program has one outside with probability 1e-4.
     """
     belief, altitude_m = WRONG[case]
     scenario = steady("keeping", dynamics="hcw", filter=belief)
