@@ -91,6 +91,7 @@ def integrated_tables(scenario: Scenario, gains: LQRTrackingSettings) -> tuple[A
 def _integrate_leg(scenario: Scenario, leg: Leg, gains: LQRTrackingSettings) -> tuple[Array, Array]:
     """Gains (steps + 1, 3, 6) and pulls (steps + 1, 3) of a phase; after it the error is weighed as if it went on."""
     (A, B), steps = continuous_model(scenario), np.arange(leg.start, leg.end + 1)
+    times_s: Array = scenario.dt_s * steps.astype(float)
     way = desired_path(scenario, leg, gains.guidance)
     desired = np.vstack([way, leg_reference(scenario, leg, steps[len(way) :])])
     P = continuous_gain(A, B, gains.hold.Q(), gains.hold.R(scenario.orbit))[1]
@@ -101,7 +102,7 @@ def _integrate_leg(scenario: Scenario, leg: Leg, gains: LQRTrackingSettings) -> 
         if first == last:
             continue
         R, part = weights.R(scenario.orbit), slice(first, last + 1)
-        P_on, g_on = integrate_tracking(A, B, weights.Q(), R, scenario.dt_s * steps[part], desired[part], P, g)
+        P_on, g_on = integrate_tracking(A, B, weights.Q(), R, times_s[part], desired[part], P, g)
         K[first:last] = np.linalg.solve(R, B.T @ P_on[:-1])
         pull[first:last] = np.linalg.solve(R, B.T @ g_on[:-1].T).T
         P, g = P_on[0], g_on[0]
