@@ -37,12 +37,15 @@ def measurement(scenario: Scenario) -> tuple[Array, Array]:
 def stationary_filter(scenario: Scenario) -> StationaryFilter:
     """What a scenario's filter settles at without losses and thrust noise, by its own beliefs.
 
-    With the gains of `riccati.stationary_gain` it makes the LQG controller of constant gains.
+    With the gains of `riccati.stationary` it makes the LQG controller of constant gains.
 
     Raises:
-        ValueError: there is no noise, in the process or in the sensor; then nothing settles, or at zero.
+        ValueError: there is no noise, in the process or in the sensor, or the model varies; then nothing settles, or
+            at zero.
     """
     belief, model = scenario.belief, scenario.filter_model()
+    if model.Phi.ndim == 3:
+        raise ValueError(f"filter.dynamics: must be a model that does not vary, got {belief.dynamics}")
     H, R_noise = measurement(scenario)
     for key, value in (("process_noise_m_s2", belief.process_noise_m_s2), ("sigma", R_noise.diagonal().min())):
         if value <= 0:

@@ -67,20 +67,23 @@ def integrate_tracking(
 
     def rates(time_s: float, packed: Array) -> Array:
         P, g = packed[:-size].reshape(size, size), packed[-size:]
-        index = min(max(int(np.searchsorted(times_s, time_s)), 1), len(times_s) - 1)
-        share = (time_s - times_s[index - 1]) / (times_s[index] - times_s[index - 1])
-        y_d = desired[index - 1] + share * (desired[index] - desired[index - 1])
-        loop = (A - control_cost @ P).T
         # P' + A' P + P A - P B R^-1 B' P + Q = 0 (4.13)
         half = P @ A - 0.5 * P @ control_cost @ P
         # g' = -(A - B R^-1 B' P)' g - Q y_d
-        return np.concatenate([(-half - half.T - Q).ravel(), -loop @ g - Q @ y_d])
+        g_rate = -(A - control_cost @ P).T @ g - Q @ _between(time_s, times_s, desired)
+        return np.concatenate([(-half - half.T - Q).ravel(), g_rate])
 
-    end = np.concatenate([P_end.ravel(), g_end])
-    span = (times_s[-1], times_s[0])
-    solution = solve_ivp(rates, span, end, "DOP853", t_eval=times_s[::-1], rtol=1e-8, atol=1e-8)
-    packed = solution.y.T[::-1]
+    end, span = np.concatenate([P_end.ravel(), g_end]), (times_s[-1], times_s[0])
+    packed = solve_ivp(rates, span, end, "DOP853", t_eval=times_s[::-1], rtol=1e-8, atol=1e-8).y.T[::-1]
     return packed[:, :-size].reshape(-1, size, size), packed[:, -size:]
+
+
+def _between(time_s: float, times_s: Array, values: Array) -> Array:
+    """Value (m,) at a time on the straight lines between values (T, m) at increasing times (T,), s."""
+    after = min(max(int(np.searchsorted(times_s, time_s)), 1), len(times_s) - 1)
+    share = (time_s - times_s[after - 1]) / (times_s[after] - times_s[after - 1])
+    value: Array = values[after - 1] + share * (values[after] - values[after - 1])
+    return value
 
 
 def finite_horizon_gains(Phi: Array, Gamma: Array, Q: Array, R: Array, terminal: Array) -> Array:

@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from baselines.transfers import hohmann, spiral_delta_v, spiral_ratio, two_impulse
-from formation_env.dynamics import HCW, DiscreteModel, ModifiedHCW, discretise
+from formation_env.dynamics import HCW, DiscreteModel, ModifiedHCW
 from formation_env.dynamics.base import Array
 from formation_env.orbit import Orbit
 from formation_env.spacecraft import Spacecraft
@@ -34,7 +34,7 @@ def circular(radius_m: float, up_m_s: float = 0.0, ahead_m_s: float = 0.0) -> Ar
 
 
 def model_over(time_s: float, dynamics: type = HCW) -> DiscreteModel:
-    return discretise(dynamics(), time_s, ORBIT, Spacecraft(), Spacecraft())
+    return dynamics().discretise(0.0, time_s, ORBIT, Spacecraft(), Spacecraft())
 
 
 def test_hohmann_is_vallados_example() -> None:
