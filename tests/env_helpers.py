@@ -4,6 +4,7 @@ import dataclasses
 from typing import Any
 
 import numpy as np
+import oracles
 from numpy.typing import NDArray
 from oracles import hcw_state_matrix
 from scipy.linalg import expm
@@ -99,8 +100,15 @@ def row_of(results: tuple[Any, ...], row: int) -> tuple[Any, ...]:
 
 
 def mean_motion(scenario: Scenario) -> float:
-    """n = sqrt(mu / r^3), rad/s."""
-    return float(np.sqrt(MU / (R_EARTH + scenario.orbit.altitude_m) ** 3))
+    """The rate n of the reference, rad/s: of the leader's radius, or of its mean radius under J2 (Brouwer 1959)."""
+    orbit = scenario.orbit
+    a = R_EARTH + orbit.altitude_m
+    radius = a
+    if orbit.reference == "mean":
+        q, i = oracles.J2 * R_EARTH**2 / a, np.radians(orbit.inclination_deg)
+        u = np.radians(orbit.arg_perigee_deg + orbit.true_anomaly_deg)
+        radius = a - 1.5 * q * np.sin(i) ** 2 * np.cos(2 * u) + 0.75 * q * (1 - 3 * np.cos(i) ** 2)
+    return float(np.sqrt(MU / radius**3))
 
 
 def coast(state: Array, time_s: float, scenario: Scenario) -> Array:
