@@ -9,6 +9,9 @@ from typing import Final
 from formation_env import observation, schedule
 from formation_env.jit import LANES
 
+LaneSet = tuple[bool, ...]
+"""Its length says how many rows of a tile are computed."""
+
 _next_field = 0
 
 

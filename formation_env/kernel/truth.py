@@ -14,8 +14,7 @@ from formation_env.kernel import lanes
 from formation_env.kernel import tile as f
 from formation_env.kernel.linear import propagate, read_model
 from formation_env.kernel.packing import Forces, Model, Scalars
-
-LaneSet = tuple[bool, ...]
+from formation_env.kernel.tile import LaneSet
 
 # Butcher's method of order 6 with 7 stages (Butcher 1964, "On Runge-Kutta processes of high order"). The last row
 # gives the step's end.
