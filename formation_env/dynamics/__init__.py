@@ -3,9 +3,10 @@
 from formation_env.dynamics.base import DiscreteModel, Dynamics, discretise
 from formation_env.dynamics.hcw import HCW, transition_matrix
 from formation_env.dynamics.modified_hcw import ModifiedHCW
+from formation_env.dynamics.printed_hcw import PrintedHCW
 from formation_env.settings import nearest
 
-DYNAMICS: dict[str, type[Dynamics]] = {"hcw": HCW, "modified_hcw": ModifiedHCW}
+DYNAMICS: dict[str, type[Dynamics]] = {"hcw": HCW, "modified_hcw": ModifiedHCW, "printed_hcw": PrintedHCW}
 
 
 def get_dynamics(name: str) -> Dynamics:
@@ -25,6 +26,7 @@ __all__ = [
     "DiscreteModel",
     "Dynamics",
     "ModifiedHCW",
+    "PrintedHCW",
     "discretise",
     "get_dynamics",
     "transition_matrix",
