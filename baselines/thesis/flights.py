@@ -67,8 +67,8 @@ class Flights:
         return self.steps * self.scenario.dt_s
 
     def error_m(self, policy: int, seed: int = 0) -> Array:
-        """Error vectors (instants, 3) of one of the first few seeds: true minus desired position, m."""
-        return self.truth[:, policy, seed, :3] - self.desired[:, :3]
+        """Error vectors (instants, 3) of one of the first few seeds: desired minus true position, m, as in Ma 2009."""
+        return self.desired[:, :3] - self.truth[:, policy, seed, :3]
 
     def index(self, periods: float) -> int:
         """Which kept instant is that many orbital periods after the start.

@@ -34,11 +34,12 @@ KEEPING_PERIODS: Final = (1, 2, 5, 10)
 """Keeping times of Figure 5.10, in periods of the orbit."""
 FAR_ENTRY: Final = ProjectedCircle(x0_m=0.0, vx0_m_s=-1.8)
 """The opposite point of the circle, [0, -3324, 0, -1.8, 0, -3.6]: 8.3 km away from the following orbit's 5 km."""
-SMALL_VELOCITY_M_S: Final = (0.0, 1.0, 0.0)
-LARGE_VELOCITY_M_S: Final = (5.0, 5.0, 5.0)
+SMALL_VELOCITY_M_S: Final = (2.0, 2.0, 0.0)
+LARGE_VELOCITY_M_S: Final = (30.0, 30.0, 0.0)
 """Initial velocities on the following orbit, where none would be right; the thesis does not print its own."""
 KEPT_S: Final = 20.0
 """Time between the instants that are kept of long flights."""
+
 
 def printed(scenario: Scenario) -> Scenario:
     """A scenario on the dynamics as printed."""

@@ -12,7 +12,7 @@ import matplotlib.figure
 from baselines.thesis import plan
 from baselines.thesis.figures import comparisons, orbits, panels, paths, style
 from baselines.thesis.figures.comparisons import Course
-from baselines.thesis.figures.notes import nothing
+from baselines.thesis.figures.notes import NOTES
 from baselines.thesis.figures.panels import Line, Window
 from baselines.thesis.flights import Flights
 from formation_env.formations import ProjectedCircle, SpaceCircle, XYEllipse
@@ -37,7 +37,7 @@ class Figure:
 
     def note(self, number: str, flown: Flown) -> str:
         """What came out, in a sentence or two; empty if there is nothing to say."""
-        return nothing(flown)
+        return NOTES[number](flown) if number in NOTES else ""
 
 
 def _initialization(flown: Flown, periods: str) -> matplotlib.figure.Figure:
@@ -48,8 +48,7 @@ def _keeping(flown: Flown) -> matplotlib.figure.Figure:
     return panels.four_panels(
         [
             Line("LQR, k as printed", flown["keeping"], 0, BLUE),
-            Line("tracking LQR, k as meant", flown["meant"], 1, SKY, "--"),
-            Line("LQR, k as meant", flown["meant"], 0, "black", ":"),
+            Line("LQR, k with its n", flown["meant"], 0, "black", "--"),
         ]
     )
 
@@ -73,7 +72,7 @@ def _sweep(flown: Flown) -> matplotlib.figure.Figure:
 def _with_and_without(flown: Flown) -> matplotlib.figure.Figure:
     return comparisons.over_time(
         [
-            Course("with communication failure", flown["failure"], 0, RED, "s"),
+            Course("with communication failure", flown["failure"], 0, "black", "s"),
             Course("without communication failure", flown["keeping"], 0, BLUE, "o"),
         ]
     )
@@ -83,7 +82,11 @@ def nearest_lqr(flown: Flown) -> Course:
     """Of all LQR weights flown, the one whose mean error is nearest to SMC's."""
     target = flown["keeping"].mean_error()[2].mean()
     flights, policy = min(
-        ((flights, policy) for flights in (flown["sweep 1"], flown["sweep 2"]) for policy in range(len(flights.delta_v()))),
+        (
+            (flights, policy)
+            for flights in (flown["sweep 1"], flown["sweep 2"])
+            for policy in range(len(flights.delta_v()))
+        ),
         key=lambda found: abs(found[0].mean_error()[found[1]].mean() - target),
     )
     return Course("LQR of nearest mean accuracy", flights, policy, BLUE, "o")
@@ -109,6 +112,7 @@ def _mission_phases(flown: Flown) -> matplotlib.figure.Figure:
             ("3 Reconfiguration", 5.05, 5.45),
             ("4 y-z circle keeping", 5.45, 10.05),
         ],
+        BLUE,
     )
 
 
@@ -158,7 +162,7 @@ FIGURES: Final[dict[str, Figure]] = {
         "Thus, the optimal initialization time is between 0.2p and 0.8p, because the control cost for shortening the "
         "transfer time is too high when tf ≤ 0.1 ≈ 9min and meanwhile it cost the control accuracy.",
         lambda flown: comparisons.against_transfer_time(
-            {periods: flown[f"initialization {periods:g}"] for periods in plan.TRANSFER_PERIODS}
+            {periods: flown[f"initialization {periods:g}"] for periods in plan.TRANSFER_PERIODS}, SKY
         ),
     ),
     "5.6": Figure(
