@@ -21,12 +21,6 @@ from formation_env.dynamics.base import Array
 from formation_env.formations import ProjectedCircle
 from formation_env.scenario import Phase, Scenario, config_folder, load_scenario
 
-TRANSFER_PERIODS: Final = tuple(round(0.1 * k, 1) for k in range(1, 15))
-"""Transfer times of Figure 5.5, in periods of the orbit."""
-SWEEP_S2: Final = (5.0, 20.0, 60.0, 120.0, 250.0, 500.0, 1000.0, 2500.0)
-"""Factors a of the control weight a I / n^2 that reach the accuracies of Figure 5.10, s^2."""
-KEEPING_PERIODS: Final = (1, 2, 5, 10)
-"""Keeping times of Figure 5.10, in periods of the orbit."""
 ENTRY: Final = ProjectedCircle(x0_m=0.0, vx0_m_s=1.8)
 """The orbit that section 5.2.4 enters at [0, 3324, 0, 1.8, 0, 3.6]."""
 
