@@ -193,9 +193,10 @@ def test_equal_drag_damps_every_oscillation() -> None:
 
 
 def test_printed_cross_track_frequency_is_the_misprint_to_the_letter() -> None:
-    """k = n sqrt(1 + s) + 3 J2 R_E^2 / (2 r1^2) cos^2 i (eq. 2.62): 1.4222e-3 rad/s, worked out by hand for 600 km, 60 deg.
+    """k = n sqrt(1 + s) + 3 J2 R_E^2 / (2 r1^2) cos^2 i (eq. 2.62): 1.4222e-3 rad/s.
 
-    By hand: n = 1.08308e-3, sqrt(1 + s) = 0.999915, 3/2 * 1.08263e-3 * 0.914017^2 / 4 = 3.3917e-4; four digits are kept.
+    By hand for 600 km, 60 deg: n = 1.08308e-3, sqrt(1 + s) = 0.999915, 3/2 * 1.08263e-3 * 0.914017^2 / 4 = 3.3917e-4;
+    four digits are kept.
     """
     orbit = Orbit()
     printed, meant = (kind().state_matrix(orbit, NO_AIR) for kind in (PrintedHCW, ModifiedHCW))
