@@ -69,16 +69,21 @@ def against_transfer_time(flown: Mapping[float, Flights], color: str) -> Figure:
     return figure
 
 
-def trade(sweeps: Sequence[Flights], periods: Sequence[int]) -> Figure:
-    """Consumption against accuracy over keeping times, a point for each weight; means over the seeds."""
+def trade(sweep: Sequence[tuple[Flights, int]], periods: Sequence[int]) -> Figure:
+    """Consumption against accuracy over keeping times, means over the seeds.
+
+    Args:
+        sweep: a point for each: flights and index of the policy.
+        periods: keeping times.
+    """
     figure = style.sheet(4.6)
     axes = figure.subplots()
     shades: Colormap = colormaps["viridis"]
     for index, time in enumerate(periods):
         color, marker = shades(index / len(periods)), "osD^"[index % 4]
-        spent = np.concatenate([flights.delta_v(time).mean(axis=1) for flights in sweeps])
+        spent = np.array([flights.delta_v(time)[policy].mean() for flights, policy in sweep])
         for quantity, dash, word in (("mean_error", "-", "mean"), ("max_error", ":", "max")):
-            error = np.concatenate([getattr(flights, quantity)(time).mean(axis=1) for flights in sweeps])
+            error = np.array([getattr(flights, quantity)(time)[policy].mean() for flights, policy in sweep])
             order = np.argsort(error)
             look: dict[str, Any] = {"color": color, "linestyle": dash, "marker": marker, "markersize": 4}
             axes.plot(error[order], spent[order], **look, label=f"t = {time} p, {word}")

@@ -1,13 +1,21 @@
 """What came out: a sentence or two below a figure, with the numbers of the flights behind it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Final
 
 from baselines.report.results import number
 from baselines.thesis import plan
+from baselines.thesis.figures.drawings import (
+    FAILED_LQR,
+    FAILED_SMC,
+    FINER,
+    LQR,
+    MEANT_LQR,
+    MEANT_TRACKING,
+    SMC,
+    Flown,
+)
 from baselines.thesis.flights import Flights
-
-Flown = Mapping[str, Flights]
 
 NO_MEASUREMENTS: Final = (
     "The environments do not give single measurements away, so they are not drawn; at a sigma of 2 m they would lie on "
@@ -69,75 +77,80 @@ def _estimation(flown: Flown) -> str:
 
 def _keeping(flown: Flown) -> str:
     printed, meant = flown["keeping"], flown["meant"]
-    share = 100 * (printed.effort()[0, :, 2] / printed.effort()[0].sum(axis=-1)).mean()
+    share = 100 * (printed.effort()[LQR, :, 2] / printed.effort()[LQR].sum(axis=-1)).mean()
     return (
-        f"{READING}error-state LQR with the printed weights errs by {_max(printed, 0)} at most with "
-        f"{_accel(printed, 0)}, {share:.3g} % of the effort across the plane: the thesis's numbers, but no spacecraft "
-        f"moves like this. With k's n the same law errs by {_mean(meant, 0)} in the mean and spends {_spent(meant, 0)} "
-        f"in place of {_spent(printed, 0)}; the trajectory-following law of eq. (4.17-4.19) errs by {_mean(meant, 1)}."
+        f"{READING}error-state LQR with the printed weights errs by {_max(printed, LQR)} at most with "
+        f"{_accel(printed, LQR)}, {share:.3g} % of the effort across the plane: the thesis's numbers, but no "
+        f"spacecraft moves like this. With k's n the same law errs by {_mean(meant, MEANT_LQR)} in the mean and "
+        f"spends {_spent(meant, MEANT_LQR)} in place of {_spent(printed, LQR)}; the trajectory-following law of "
+        f"eq. (4.17-4.19) errs by {_mean(meant, MEANT_TRACKING)}."
     )
 
 
 def _finer(flown: Flown) -> str:
-    return f"With a = {plan.FINER.control_s2:g} in place of 12000 the greatest error is {_max(flown['keeping'], 1)}."
+    return (
+        f"With a = {plan.FINER.control_s2:g} in place of 12000 the greatest error is {_max(flown['keeping'], FINER)}."
+    )
 
 
 def _sweep(flown: Flown) -> str:
     return (
         f"Each point is a weight a I / n² with a from {min(plan.SWEEP_S2):g} to {max(plan.SWEEP_S2):g}. {READING}"
-        "consumption grows in proportion to time, and hardly depends on accuracy: it pays for the wrong cross-track frequency. The thesis's axis ends at 40; its unit, "
-        "m/s², hints at a sum of accelerations over samples, which equals m/s only if they are 1 s apart."
+        "consumption grows in proportion to time, and hardly depends on accuracy: it pays for the wrong cross-track "
+        "frequency. The thesis's axis ends at 40; its unit, m/s², hints at a sum of accelerations over samples, which "
+        "equals m/s only if they are 1 s apart."
     )
 
 
 def _failure(flown: Flown) -> str:
-    failure = flown["failure"]
+    greatest = number(flown["failure"].max_error()[FAILED_LQR, 0])
     return (
-        f"On this seed the error grows to {number(failure.max_error()[0, 0])} m. How far it grows is the initial "
-        "error's doing, about which the thesis says nothing (here 50 m and 0.05 m/s on each axis, 1 sigma)."
+        f"On this seed the error grows to {greatest} m. How far it grows is the initial error's doing, about which the "
+        "thesis says nothing (here 50 m and 0.05 m/s on each axis, 1 sigma)."
     )
 
 
 def _with_and_without(flown: Flown) -> str:
-    after_1, after_10 = (
-        100 * (flown["failure"].mean_error(end)[0].mean() / flown["keeping"].mean_error(end)[0].mean() - 1)
+    failure, keeping = flown["failure"], flown["keeping"]
+    after_1, after_all = (
+        100 * (failure.mean_error(end)[FAILED_LQR].mean() / keeping.mean_error(end)[LQR].mean() - 1)
         for end in (1, None)
     )
     return (
-        f"The mean error is {after_1:.3g} % larger after one period and {after_10:.3g} % larger after all; means over "
-        f"{len(flown['keeping'].seeds)} seeds."
+        f"The mean error is {after_1:.3g} % larger after one period and {after_all:.3g} % larger after all; means over "
+        f"{len(keeping.seeds)} seeds."
     )
 
 
 def _smc(flown: Flown) -> str:
     keeping = flown["keeping"]
     return (
-        f"{READING}the greatest error is {_max(keeping, 2)}, the mean {_mean(keeping, 2)}, and the greatest "
-        f"acceleration {_accel(keeping, 2)}; the figure's axis for it ends at 20 mm/s²."
+        f"{READING}the greatest error is {_max(keeping, SMC)}, the mean {_mean(keeping, SMC)}, and the greatest "
+        f"acceleration {_accel(keeping, SMC)}; the figure's axis for it ends at 20 mm/s²."
     )
 
 
 def _smc_failure(flown: Flown) -> str:
-    failure = flown["failure"]
+    greatest = number(flown["failure"].max_error()[FAILED_SMC, 0])
     return (
-        f"On this seed the error grows to {number(failure.max_error()[1, 0])} m, and returns slowly: on the printed "
-        "sliding surface an error along x decays with 0.01 / 500 per second only, in half a day."
+        f"On this seed the error grows to {greatest} m, and returns slowly: on the printed sliding surface an error "
+        "along x decays with 0.01 / 500 per second only, in half a day."
     )
 
 
 def _lqr_or_smc(flown: Flown) -> str:
     failure = flown["failure"]
-    more = 100 * (failure.delta_v()[1].mean() / failure.delta_v()[0].mean() - 1)
+    more = 100 * (failure.delta_v()[FAILED_SMC].mean() / failure.delta_v()[FAILED_LQR].mean() - 1)
     return (
         f"SMC with the printed gains spends {more:.3g} % more than LQR with the printed weights, but its mean error is "
-        f"{_mean(failure, 1)} against {_mean(failure, 0)}: the thesis's conclusion does not come out."
+        f"{_mean(failure, FAILED_SMC)} against {_mean(failure, FAILED_LQR)}: the thesis's conclusion does not come out."
     )
 
 
 def _reconfiguration(flown: Flown) -> str:
     flights = flown["small position error"]
     return (
-        f"No weight is printed for this section; a = {plan.RECONFIGURATION.control_s2:g} gives {_accel(flights, 0)}, "
+        f"No weight is printed for this section; a = {plan.MANEUVER_S2:g} gives {_accel(flights, 0)}, "
         f"about the figure's 60 mm/s². After 0.4 periods the error is {number(_after(flights, 0.4))} m."
     )
 
@@ -162,9 +175,9 @@ def _velocity(values: tuple[float, ...]) -> str:
 def _mission(flown: Flown) -> str:
     flights = flown["mission"]
     return (
-        f"No weight is printed for this section; a = {plan.MISSION.control_s2:g} gives {_accel(flights, 0)}, about the "
-        f"figure's 100 mm/s². The greatest error, {_max(flights, 0)}, is the distance between the two formations when "
-        "they change; the figure's 3000 m needs another place on the circle to enter, which is not printed."
+        f"Neither weight nor entry are printed for this section; a = {plan.MANEUVER_S2:g} as in section 5.2.4 gives "
+        f"{_accel(flights, 0)}. The greatest error, {_max(flights, 0)}, is the distance to the circle when the "
+        "formations change; at the entry of section 5.2.4, now on the far side, it would be 5 km."
     )
 
 
