@@ -69,7 +69,8 @@ def _compared(
 ) -> Claim:
     lines = fair[(fair["truth"] == truth) & (fair["failure"] == fails)]
     line = lines[lines["price_m_s_per_m"] == PRICE].iloc[0]
-    others = ", ".join(f"{100 * row.smc_minus_lqr_m_s / row.lqr_cost_m_s:+.2g} %" for row in lines.itertuples())
+    shares = 100 * lines["smc_minus_lqr_m_s"] / lines["lqr_cost_m_s"]
+    others = ", ".join(f"{share:+.2g} %" for share in shares)
     statement = Statement(
         section,
         sentence,

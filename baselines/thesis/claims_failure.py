@@ -22,7 +22,8 @@ def claims(keep: Deck, fail: Deck, effort: Effort) -> list[Claim]:
 
 def _at(deck: Deck, time_s: float) -> Array:
     """Position errors (policies, seeds) at the kept instant next to a time, m."""
-    return deck.flights.position_error_m[int(np.abs(deck.flights.time_s - time_s).argmin())].astype(float)
+    place = int(np.abs(deck.flights.time_s - time_s).argmin())
+    return np.asarray(deck.flights.position_error_m[place], float)
 
 
 def _during(fail: Deck, effort: Effort) -> list[Claim]:

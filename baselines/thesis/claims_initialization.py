@@ -146,6 +146,6 @@ def two_impulses_m_s(Phi: Array, start: Array, end: Array) -> float:
         end: state (6,).
     """
     # r_f = Phi_rr r_0 + Phi_rv (v_0 + dv_1)
-    departure = np.linalg.solve(Phi[:3, 3:], end[:3] - Phi[:3] @ start)
+    departure = np.linalg.lstsq(Phi[:3, 3:], end[:3] - Phi[:3] @ start)[0]  # half an orbit moves nothing across
     arrival = end[3:] - Phi[3:] @ start - Phi[3:, 3:] @ departure
     return float(np.linalg.norm(departure) + np.linalg.norm(arrival))
