@@ -13,11 +13,11 @@ from baselines.thesis.claims_flights import Effort, Noise
 from baselines.thesis.claims_initialization import two_impulses_m_s
 from baselines.thesis.claims_readings import READINGS
 from baselines.thesis.claims_verdict import Between, Statement
-from formation_env.dynamics import transition_matrix
+from formation_env.dynamics.hcw import transition_matrix
 from formation_env.orbit import Orbit
 from formation_env.scenario import load_scenario
 
-TINY = Effort(seeds=2, dt_s=60.0, periods=2, coarse_dt_s=60.0, grid_dt_s=60.0, candidates=2)
+TINY = Effort(seeds=2, dt_s=60.0, periods=2, coarse_dt_s=60.0, grid_dt_s=60.0, truths=("modified_hcw",), candidates=2)
 QUIET = Noise(0.0, 0.0, 0.0, 0.0)
 
 
@@ -102,7 +102,7 @@ def test_the_misprinted_frequency_gives_the_thesis_s_300_m() -> None:
 
 
 def test_two_impulses_raise_an_orbit_as_hohmann_does() -> None:
-    """Raising a circular orbit by x takes n x / 4 at each end of half a period: the limit of Ma 2009, eq. (3.10-3.11)."""
+    """Raising a circular orbit by x takes n x / 4 at each end of half a period: limit of Ma 2009, eq. (3.10-3.11)."""
     orbit, x_m = Orbit(), 100.0
     n = orbit.mean_motion_rad_s
     end = np.array([x_m, -0.75 * math.pi * x_m, 0, 0, -1.5 * n * x_m, 0])

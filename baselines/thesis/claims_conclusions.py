@@ -9,10 +9,11 @@ import pandas as pd
 from baselines.riccati import closed_loop, least_fuel_gains
 from baselines.thesis import plan, scenarios
 from baselines.thesis.claim import Claim
-from baselines.thesis.claims_fair import LINEAR, NONLINEAR
+from baselines.thesis.claims_fair import LINEAR
 from baselines.thesis.claims_flights import Deck, Effort
 from baselines.thesis.claims_maneuver import Maneuvers, assumption_of
 from baselines.thesis.claims_verdict import Between, Statement
+from formation_env.dynamics import NONLINEAR
 from formation_env.dynamics.base import Array
 from formation_env.scenario import Scenario
 

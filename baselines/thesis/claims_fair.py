@@ -24,7 +24,6 @@ from formation_env.seeds import seeds
 PRICES: Final = (1e-3, 1e-2, 1e-1, 1.0)
 """Of the mean error, (m/s) per m."""
 LINEAR: Final = ("modified_hcw", plan.DYNAMICS)
-NONLINEAR: Final = "nonlinear"
 TUNING_SEEDS: Final = 12
 TUNING_STEP_S: Final = 30.0
 LAWS: Final = ("lqr", "smc")
@@ -74,11 +73,10 @@ def _smc(decay_per_s: float, q_per_s: float) -> Gains:
 
 
 def keeping(truth: str, fails: bool, effort: Effort, dt_s: float) -> Scenario:
-    """Section 5.2.2 on a truth, with or without failure; filter and laws believe the truth if it is linear."""
+    """Section 5.2.2 on a truth, with or without failure; filter and laws believe a nonlinear one to be modified HCW."""
     make = scenarios.keeping_failure if fails else scenarios.keeping
     scenario = effort.noise.on(make(effort.grid_periods, dt_s=dt_s))
-    believed = "modified_hcw" if truth == NONLINEAR else truth
-    return replace(scenario, dynamics=truth, filter=replace(scenario.filter, dynamics=believed))
+    return replace(scenario, dynamics=truth)
 
 
 @dataclass(frozen=True)

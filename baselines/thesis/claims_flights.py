@@ -9,6 +9,7 @@ from baselines.registry import make_policy
 from baselines.thesis import plan, scenarios
 from baselines.thesis.flights import Flights
 from baselines.thesis.jobs import Job, Law
+from formation_env.dynamics import NONLINEAR
 from formation_env.scenario import Scenario
 from formation_env.seeds import seeds
 
@@ -87,7 +88,7 @@ class Effort:
     coarse_dt_s: float = 10.0
     grid_dt_s: float = 2.0
     grid_periods: int = 2
-    truths: tuple[str, ...] = ("modified_hcw", plan.DYNAMICS)
+    truths: tuple[str, ...] = ("modified_hcw", plan.DYNAMICS, NONLINEAR)
     candidates: int = 8
 
     @property

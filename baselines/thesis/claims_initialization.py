@@ -9,8 +9,8 @@ from baselines.thesis.claim import Claim
 from baselines.thesis.claims_flights import Effort
 from baselines.thesis.claims_verdict import Between, Statement
 from baselines.thesis.flights import Flights
-from formation_env.dynamics import transition_matrix
 from formation_env.dynamics.base import Array
+from formation_env.dynamics.hcw import transition_matrix
 
 HALF, TENTH = 0.5, 0.1
 _WHY_LAG = (
