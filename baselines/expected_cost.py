@@ -46,13 +46,15 @@ def knowledge(scenario: Scenario, model: DiscreteModel) -> Knowledge:
     H = np.eye(6) if scenario.sensor.measures == "position_and_velocity" else np.eye(3, 6)
     R_noise = np.diag(np.repeat([belief.sigma_pos_m, belief.sigma_vel_m_s], 3) ** 2)[: len(H), : len(H)]
     P = np.diag(np.repeat([start.spread_pos_m, start.spread_vel_m_s], 3) ** 2)
+    model = model.steps(0, scenario.num_steps)
     Q_noise = process_noise_covariance(model.Gamma, belief.process_noise_m_s2)
     missed, learned = np.zeros((2, scenario.num_steps + 1, 6, 6))
     for step in range(scenario.num_steps + 1):
         S = H @ P @ H.T + R_noise
         learned[step] = P @ H.T @ np.linalg.pinv(S, hermitian=True) @ H @ P
         missed[step] = P - learned[step]
-        P = model.Phi @ missed[step] @ model.Phi.T + Q_noise
+        if step < scenario.num_steps:
+            P = model.Phi[step] @ missed[step] @ model.Phi[step].T + Q_noise[step]
     return Knowledge(missed, learned)
 
 
@@ -77,7 +79,7 @@ def spread(model: DiscreteModel, gains: Array, start: Array, first: Array, known
     """How far controls and errors scatter under u = -K e_hat.
 
     Args:
-        model: the filter's model.
+        model: the filter's model of each step (steps, ...).
         gains: (steps, 3, 6).
         start: mean error (6,) at the beginning.
         first: covariance (6, 6) of the estimate about it.
@@ -89,7 +91,7 @@ def spread(model: DiscreteModel, gains: Array, start: Array, first: Array, known
         squares = ((K @ second) * K).sum(axis=1)  # the diagonal of K X K'
         control[step], peak[step] = np.sqrt(squares.sum()), np.sqrt(squares.max())
         error[step] = _rms_position(second, known.missed[step])
-        loop = model.Phi - model.Gamma @ K
+        loop = model.Phi[step] - model.Gamma[step] @ K
         second = loop @ second @ loop.T + known.learned[step + 1]
     error[-1] = _rms_position(second, known.missed[-1])
     return Spread(control, error, peak, second)
@@ -137,7 +139,8 @@ def _phase_gains(
     price_scale: float,
 ) -> tuple[Array, Array]:
     """Gains of a phase, and the second moment (6, 6) of the estimated error at its end."""
-    model, limit, position = scenario.filter_model(), scenario.spacecraft.max_accel_m_s2, np.diag([1.0, 1, 1, 0, 0, 0])
+    limit, position = scenario.spacecraft.max_accel_m_s2, np.diag([1.0, 1, 1, 0, 0, 0])
+    model = scenario.filter_model().steps(leg.start, leg.end)
     price = price_scale * _error_price(scenario, leg)
     control_weight, error_weight = np.full(leg.end - leg.start, scenario.dt_s / limit), price / FIRST_ERROR_M
     for _ in range(rounds + 1):

@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 from baselines.expected_cost import expected_cost_gains
 from baselines.policy import Observations
 from baselines.riccati import closed_loop, least_fuel_gains
-from baselines.timeline import longest_phase, nominal_start, start_error, transfer_reference
-from formation_env.dynamics import transition_matrix
+from baselines.timeline import by_steps_left, nominal_start, start_error, transfer_reference
 from formation_env.dynamics.base import Array
 from formation_env.scenario import Scenario
-from formation_env.schedule import Leg, leg_reference, legs, observation_layout
+from formation_env.schedule import Leg, leg_reference, observation_layout
 
 Guide = Literal["automatic", "straight_line", "least_fuel", "least_cost"]
 
@@ -51,20 +50,17 @@ class Tracking:
 
 
 class Guidance:
-    """The desired path of a scenario, looked up by phase and steps left."""
+    """The desired path of a scenario, looked up by phase and steps left.
+
+    Attributes:
+        residuals: `Tracking.residual` of all instants (phases, steps left, 6).
+    """
 
     def __init__(self, scenario: Scenario, guide: Guide) -> None:
-        model = scenario.filter_model()
-        step = transition_matrix(scenario.orbit.mean_motion_rad_s, scenario.dt_s)
         self._dt_s = scenario.dt_s
         self._layout = observation_layout(scenario)
-        self._reference_residual = step - model.Phi
-        self._delta = model.delta
-        self._offsets = _offsets(scenario, guide)
-        following = np.roll(self._offsets, 1, axis=1)
-        following[:, 0] = 0
-        # x_d(k+1) - Phi x_d(k), without the reference's share
-        self._residuals = following - self._offsets @ model.Phi.T
+        self._offsets = by_steps_left(scenario, lambda leg: _desired(scenario, leg, guide) - _reference(scenario, leg))
+        self.residuals = by_steps_left(scenario, lambda leg: _residual(scenario, leg, _desired(scenario, leg, guide)))
 
     def track(self, observation: Observations) -> Tracking:
         """Compare the estimate with the desired path.
@@ -81,21 +77,28 @@ class Guidance:
         return Tracking(
             error=layout.state(observation, "error") - offset,
             desired=reference + offset,
-            residual=reference @ self._reference_residual.T - self._delta + self._residuals[phase, steps],
+            residual=self.residuals[phase, steps],
             phase=phase,
             steps_left=steps,
             in_hold=layout.scalar(observation, "in_hold") > 0.5,
         )
 
 
-def _offsets(scenario: Scenario, guide: Guide) -> Array:
-    """Desired minus reference state (phases, steps left, 6)."""
-    offsets = np.zeros((len(scenario.phases), longest_phase(scenario) + 1, 6))
-    for leg in legs(scenario):
-        path = desired_path(scenario, leg, guide)
-        steps = leg.start + np.arange(len(path))
-        offsets[leg.index, leg.end - steps] = path - leg_reference(scenario, leg, steps)
-    return offsets
+def _reference(scenario: Scenario, leg: Leg) -> Array:
+    """Reference states (steps + 1, 6) of a phase."""
+    return leg_reference(scenario, leg, np.arange(leg.start, leg.end + 1))
+
+
+def _desired(scenario: Scenario, leg: Leg, guide: Guide) -> Array:
+    """Desired states (steps + 1, 6) of a phase: the path, and where it ends the reference."""
+    path = desired_path(scenario, leg, guide)
+    return np.concatenate([path, _reference(scenario, leg)[len(path) :]])
+
+
+def _residual(scenario: Scenario, leg: Leg, desired: Array) -> Array:
+    """x_d(k+1) - Phi x_d(k) - delta of each step of a phase (steps, 6)."""
+    model = scenario.filter_model().steps(leg.start, leg.end)
+    return desired[1:] - (model.Phi @ desired[:-1, :, None])[..., 0] - model.delta
 
 
 def desired_path(scenario: Scenario, leg: Leg, guide: Guide) -> Array:
@@ -125,7 +128,7 @@ def straight_line(scenario: Scenario, leg: Leg) -> Array:
 @lru_cache(maxsize=64)
 def least_fuel_path(scenario: Scenario, leg: Leg) -> Array:
     """The path of few burns from the nominal start to the arrival by the filter's model, states (steps + 1, 6)."""
-    model = scenario.filter_model()
+    model = scenario.filter_model().steps(leg.start, leg.arrival)
     n = scenario.orbit.mean_motion_rad_s
     start = start_error(scenario, leg)
     R = np.tile(np.eye(3) / n**4, (leg.arrival - leg.start, 1, 1))
@@ -140,7 +143,7 @@ def least_fuel_path(scenario: Scenario, leg: Leg) -> Array:
 
 def least_cost_path(scenario: Scenario, leg: Leg) -> Array:
     """The mean path of the regulator of least expected cost, states (steps + 1, 6) over the whole phase."""
-    model = scenario.filter_model()
+    model = scenario.filter_model().steps(leg.start, leg.end)
     gains = expected_cost_gains(scenario)[leg.index]
     reference = leg_reference(scenario, leg, np.arange(leg.start, leg.end + 1))
     return reference + closed_loop(model.Phi, model.Gamma, gains, start_error(scenario, leg))[0]

@@ -9,12 +9,12 @@ from pydantic import Field, Strict, model_validator
 from baselines.expected_cost import expected_cost_gains
 from baselines.guidance import Guidance, Guide, desired_path
 from baselines.policy import AccelerationPolicy, Observations
-from baselines.riccati import least_fuel_gains, stationary_gain
-from baselines.timeline import longest_phase, nominal_start
+from baselines.riccati import finite_horizon_gains, least_fuel_gains, stationary
+from baselines.timeline import by_steps_left, nominal_start
 from baselines.weights import Weights
 from formation_env.dynamics.base import Array
 from formation_env.scenario import Scenario
-from formation_env.schedule import Leg, legs
+from formation_env.schedule import Leg
 from formation_env.settings import Flag, Positive, settings
 
 Rounds = Annotated[int, Strict(), Field(ge=0, le=100)]
@@ -90,23 +90,17 @@ class LQR(AccelerationPolicy):
         super().__init__(scenario)
         self.gains = gains
         self._guidance = Guidance(scenario, gains.guidance)
-        self._to_accel = np.linalg.pinv(scenario.filter_model().Gamma) * gains.feedforward
-        self.K = gain_table(scenario, gains)
+        model = scenario.filter_model()
+        self.K = by_steps_left(scenario, lambda leg: phase_gains(scenario, leg, gains))
+        to_accel = by_steps_left(scenario, lambda leg: np.linalg.pinv(model.steps(leg.start, leg.end).Gamma))
+        self._own_thrust = gains.feedforward * (to_accel @ self._guidance.residuals[..., None])[..., 0]
 
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
         now = self._guidance.track(observation)
         feedback = -(self.K[now.phase, now.steps_left] @ now.error[..., None])[..., 0]
-        acceleration: Array = feedback + now.residual @ self._to_accel.T
+        acceleration: Array = feedback + self._own_thrust[now.phase, now.steps_left]
         return acceleration
-
-
-def gain_table(scenario: Scenario, gains: LQRSettings) -> Array:
-    """Gains (phases, steps left, 3, 6)."""
-    table = np.zeros((len(scenario.phases), longest_phase(scenario) + 1, 3, 6))
-    for leg in legs(scenario):
-        table[leg.index, leg.end - leg.start : 0 : -1] = phase_gains(scenario, leg, gains)
-    return table
 
 
 def phase_gains(scenario: Scenario, leg: Leg, gains: LQRSettings) -> Array:
@@ -114,23 +108,29 @@ def phase_gains(scenario: Scenario, leg: Leg, gains: LQRSettings) -> Array:
     if gains.design == "expected_cost":
         wanted = gains.expected_cost
         return expected_cost_gains(scenario, wanted.rounds, wanted.floor, wanted.price_scale)[leg.index]
-    hold = np.tile(_stationary(scenario, gains.hold), (leg.end - leg.arrival, 1, 1))
+    hold = _regulator(scenario, gains.hold)[leg.arrival : leg.end]
     if gains.transfer.horizon == "infinite":
-        transfer = np.tile(_stationary(scenario, gains.transfer.weights), (leg.arrival - leg.start, 1, 1))
+        transfer = _regulator(scenario, gains.transfer.weights)[leg.start : leg.arrival]
     else:
         transfer = transfer_gains(scenario, leg, gains.guidance, gains.transfer)
     return np.concatenate([transfer, hold])
 
 
-def _stationary(scenario: Scenario, weights: Weights) -> Array:
-    model = scenario.filter_model()
-    return stationary_gain(model.Phi, model.Gamma, weights.Q(), weights.R(scenario.orbit))
+@lru_cache(maxsize=8)
+def _regulator(scenario: Scenario, weights: Weights) -> Array:
+    """Gains (steps, 3, 6) of a regulator without end: one gain, or if the model varies, one for each step."""
+    model, Q, R = scenario.filter_model(), weights.Q(), weights.R(scenario.orbit)
+    steps = scenario.num_steps
+    if model.Phi.ndim == 2:
+        return np.broadcast_to(stationary(model.Phi, model.Gamma, Q, R)[0], (steps, 3, 6))
+    _, P = stationary(model.Phi[-1], model.Gamma[-1], Q, R)
+    return finite_horizon_gains(model.Phi, model.Gamma, Q, np.broadcast_to(R, (steps, 3, 3)), P)
 
 
 @lru_cache(maxsize=64)
 def transfer_gains(scenario: Scenario, leg: Leg, guidance: Guide, transfer: TransferSettings) -> Array:
     """Gains (steps, 3, 6) of a leg's transfer, from its start on; the weights are renewed for the nominal start."""
-    model = scenario.filter_model()
+    model = scenario.filter_model().steps(leg.start, leg.arrival)
     start = nominal_start(scenario, leg) - desired_path(scenario, leg, guidance)[0]
     R = np.tile(transfer.weights.R(scenario.orbit), (leg.arrival - leg.start, 1, 1))
     limit = scenario.spacecraft.max_accel_m_s2

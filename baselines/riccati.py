@@ -14,8 +14,8 @@ OVERLOAD: Final = 10.0
 """How much more a control costs in `least_fuel_gains`, per limit beyond the limit."""
 
 
-def stationary_gain(Phi: Array, Gamma: Array, Q: Array, R: Array) -> Array:
-    """Gain (3, 6) of the infinite horizon in discrete time, by python-control.
+def stationary(Phi: Array, Gamma: Array, Q: Array, R: Array) -> tuple[Array, Array]:
+    """Gain (3, 6) and cost-to-go (6, 6) of the infinite horizon in discrete time, by python-control.
 
     Args:
         Phi: state transition matrix (6, 6) over the step.
@@ -23,8 +23,8 @@ def stationary_gain(Phi: Array, Gamma: Array, Q: Array, R: Array) -> Array:
         Q: state weight (6, 6).
         R: control weight (3, 3).
     """
-    K, _, _ = control.dlqr(Phi, Gamma, Q, R)
-    return np.asarray(K)
+    K, P, _ = control.dlqr(Phi, Gamma, Q, R)
+    return np.asarray(K), np.asarray(P)
 
 
 def continuous_gain(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
@@ -44,8 +44,8 @@ def finite_horizon_gains(Phi: Array, Gamma: Array, Q: Array, R: Array, terminal:
     """Gains of a finite horizon with a constant weight on the way: the discrete form of Ma 2009, eq. (4.12-4.14).
 
     Args:
-        Phi: state transition matrix (6, 6).
-        Gamma: input matrix (6, 3).
+        Phi: state transition matrix (6, 6), or of each step (steps, 6, 6).
+        Gamma: input matrix (6, 3), or of each step (steps, 6, 3).
         Q: weight (6, 6) of the state at every step but the last.
         R: control weights (steps, 3, 3), from the first step on.
         terminal: weight (6, 6) of the last state.
@@ -60,31 +60,37 @@ def time_varying_gains(Phi: Array, Gamma: Array, Q: Array, R: Array) -> Array:
     """Gains of a finite horizon by the backward Riccati recursion.
 
     Args:
-        Phi: state transition matrix (6, 6).
-        Gamma: input matrix (6, 3).
+        Phi: state transition matrix (6, 6), or of each step (steps, 6, 6).
+        Gamma: input matrix (6, 3), or of each step (steps, 6, 3).
         Q: state weights (steps + 1, 6, 6), from the first state to the last.
         R: control weights (steps, 3, 3).
 
     Returns:
         Gains (steps, 3, 6), from the first step on.
     """
-    gains = np.zeros((len(R), 3, 6))
+    gains, (Phis, Gammas) = np.zeros((len(R), 3, 6)), per_step(Phi, Gamma, len(R))
     P = Q[-1]
     for step in reversed(range(len(R))):
-        PG = P @ Gamma
+        F, G = Phis[step], Gammas[step]
+        PG = P @ G
         # K = (R + Gamma' P Gamma)^-1 Gamma' P Phi;  P <- Phi' P (Phi - Gamma K) + Q
-        gains[step] = np.linalg.solve(R[step] + Gamma.T @ PG, PG.T @ Phi)
-        P = Phi.T @ P @ (Phi - Gamma @ gains[step]) + Q[step]
+        gains[step] = np.linalg.solve(R[step] + G.T @ PG, PG.T @ F)
+        P = F.T @ P @ (F - G @ gains[step]) + Q[step]
         P = (P + P.T) / 2
     return gains
+
+
+def per_step(Phi: Array, Gamma: Array, steps: int) -> tuple[Array, Array]:
+    """Both of each step, (steps, 6, 6) and (steps, 6, 3), be they the same for all or not."""
+    return np.broadcast_to(Phi, (steps, 6, 6)), np.broadcast_to(Gamma, (steps, 6, 3))
 
 
 def closed_loop(Phi: Array, Gamma: Array, gains: Array, start: Array) -> tuple[Array, Array]:
     """Follow u = -K x from a start.
 
     Args:
-        Phi: state transition matrix (6, 6).
-        Gamma: input matrix (6, 3).
+        Phi: state transition matrix (6, 6), or of each step (steps, 6, 6).
+        Gamma: input matrix (6, 3), or of each step (steps, 6, 3).
         gains: (steps, 3, 6).
         start: state (6,).
 
@@ -92,10 +98,11 @@ def closed_loop(Phi: Array, Gamma: Array, gains: Array, start: Array) -> tuple[A
         States (steps + 1, 6) and controls (steps, 3).
     """
     states, controls = np.zeros((len(gains) + 1, 6)), np.zeros((len(gains), 3))
+    Phis, Gammas = per_step(Phi, Gamma, len(gains))
     states[0] = start
     for step, K in enumerate(gains):
         controls[step] = -K @ states[step]
-        states[step + 1] = Phi @ states[step] + Gamma @ controls[step]
+        states[step + 1] = Phis[step] @ states[step] + Gammas[step] @ controls[step]
     return states, controls
 
 
@@ -109,8 +116,8 @@ def least_fuel_gains(
     the limit is charged `OVERLOAD` times more, and the weights move by half of the way (in logarithm), lest they swing.
 
     Args:
-        Phi: state transition matrix (6, 6).
-        Gamma: input matrix (6, 3).
+        Phi: state transition matrix (6, 6), or of each step (steps, 6, 6).
+        Gamma: input matrix (6, 3), or of each step (steps, 6, 3).
         R: control weights (steps, 3, 3) of the first round.
         terminal: weight (6, 6) of the last state.
         start: state (6,).

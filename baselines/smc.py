@@ -6,7 +6,8 @@ from baselines.guidance import Guidance, Guide
 from baselines.policy import AccelerationPolicy, Observations
 from baselines.reaching import AnyReaching, ExponentialReaching
 from baselines.surfaces import AnySurface, PlacedSurface
-from formation_env.dynamics.base import Array
+from baselines.timeline import by_steps_left
+from formation_env.dynamics.base import Array, DiscreteModel
 from formation_env.scenario import Scenario
 from formation_env.settings import NonNegative, settings
 
@@ -38,16 +39,21 @@ class SMC(AccelerationPolicy):
         self.gains = gains
         self._guidance = Guidance(scenario, gains.guidance)
         model = scenario.filter_model()
-        self.Ce = gains.surface.Ce(model, scenario.dt_s)
-        self._Ce_Phi = self.Ce @ model.Phi
-        self._inverse = np.linalg.inv(self.Ce @ model.Gamma)
+        first = model.steps(0, 1)
+        self.Ce = gains.surface.Ce(DiscreteModel(first.Phi[0], first.Gamma[0], first.delta[0]), scenario.dt_s)
+        self._Ce_Phi = by_steps_left(scenario, lambda leg: self.Ce @ model.steps(leg.start, leg.end).Phi)
+        self._inverse = by_steps_left(
+            scenario, lambda leg: np.linalg.inv(self.Ce @ model.steps(leg.start, leg.end).Gamma)
+        )
 
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
         now = self._guidance.track(observation)
         # Ce x_d(k+1) - Ce Phi x(k) = Ce residual - Ce Phi (x - x_d): the path's own thrust, and the error's free motion
-        free = now.residual @ self.Ce.T - now.error @ self._Ce_Phi.T
-        return (free - self.next_surface(-now.error @ self.Ce.T)) @ self._inverse.T
+        at = (now.phase, now.steps_left)
+        free = now.residual @ self.Ce.T - (self._Ce_Phi[at] @ now.error[..., None])[..., 0]
+        wanted = free - self.next_surface(-now.error @ self.Ce.T)
+        return np.asarray((self._inverse[at] @ wanted[..., None])[..., 0])
 
     def next_surface(self, s: Array) -> Array:
         """Where the reaching law takes s (..., 3) in one step, m (eq. 4.56)."""

@@ -1,5 +1,7 @@
 """Phases on the clock, as the policies look things up: by phase and by steps left to its end."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from formation_env.dynamics.base import Array
@@ -7,9 +9,20 @@ from formation_env.scenario import Scenario
 from formation_env.schedule import Leg, leg_reference, legs
 
 
-def longest_phase(scenario: Scenario) -> int:
-    """Steps of the longest phase, transfer and hold."""
-    return max(leg.end - leg.start for leg in legs(scenario))
+def by_steps_left(scenario: Scenario, values: Callable[[Leg], Array]) -> Array:
+    """A table (phases, steps left, ...) of what a policy needs at each instant; 0 where there is nothing.
+
+    Args:
+        scenario: what is flown.
+        values: gives the values (count, ...) of a phase, from its beginning on.
+    """
+    plan = legs(scenario)
+    parts = [values(leg) for leg in plan]
+    longest = max(leg.end - leg.start for leg in plan)
+    table = np.zeros((len(plan), longest + 1, *parts[0].shape[1:]))
+    for leg, part in zip(plan, parts, strict=True):
+        table[leg.index, leg.end - leg.start - np.arange(len(part))] = part
+    return table
 
 
 def nominal_start(scenario: Scenario, leg: Leg) -> Array:

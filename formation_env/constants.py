@@ -13,3 +13,12 @@ J2: Final = 1.08263e-3
 
 OMEGA_EARTH: Final = 7.292115e-5
 """Rotation rate of the Earth, rad/s."""
+
+MU_SUN: Final = 1.32712440018e20
+"""Gravitational parameter of the Sun, m^3/s^2."""
+
+MU_MOON: Final = 4.9028001e12
+"""Gravitational parameter of the Moon, m^3/s^2."""
+
+AU_M: Final = 1.495978707e11
+"""Astronomical unit, m."""

@@ -83,19 +83,20 @@ class Belief:
 
 
 def process_noise_covariance(Gamma: Array, sigma_m_s2: float) -> Array:
-    """Q_noise (6, 6) = Gamma Gamma' sigma^2 of white accelerations held over each step.
+    """Q_noise (..., 6, 6) = Gamma Gamma' sigma^2 of white accelerations held over each step.
 
     Args:
-        Gamma: input matrix (6, 3) of the step.
+        Gamma: input matrix (..., 6, 3) of the step.
         sigma_m_s2: 1-sigma of each axis, m/s^2.
     """
-    Q_noise: Array = sigma_m_s2**2 * Gamma @ Gamma.T
+    Q_noise: Array = sigma_m_s2**2 * Gamma @ np.swapaxes(Gamma, -1, -2)
     return Q_noise
 
 
 def upper_triangle(matrix: Array) -> Array:
-    """The upper triangle of a symmetric matrix (m, m), row by row: (m (m + 1) / 2,)."""
-    return matrix[np.triu_indices(len(matrix))]
+    """The upper triangle of symmetric matrices (..., m, m), row by row: (..., m (m + 1) / 2)."""
+    rows, columns = np.triu_indices(matrix.shape[-1])
+    return matrix[..., rows, columns]
 
 
 @lane

@@ -86,6 +86,23 @@ def log(x: float) -> float:
     return fma(y, series, exponent * _LN_2)
 
 
+_EXP_SERIES: Final = (1.0, 1.0, 1 / 2, 1 / 6, 1 / 24, 1 / 120, 1 / 720, 1 / 5040, 1 / 40320, 1 / 362880)  # Taylor
+_BIAS: Final = 1023.0
+
+
+@lane
+def exp(x: float) -> float:
+    """e^x; below -700 and above 700 the value there."""
+    # x = k ln 2 + y with |y| <= ln 2 / 2; 2^k by its exponent bits
+    turns = min(max(x, -700.0), 700.0) / _LN_2
+    biased = from_integer(to_integer(turns + _BIAS))  # rounds to the nearest
+    y = (turns + _BIAS - biased) * _LN_2
+    c = _EXP_SERIES
+    series = fma(polynomial_4(y, c[5:]), y, c[4])
+    series = fma(fma(fma(fma(series, y, c[3]), y, c[2]), y, c[1]), y, c[0])
+    return series * from_bits(to_integer(biased) << _SHIFT_52)
+
+
 _SINE: Final = (-1 / 6, 1 / 120, -1 / 5040, 1 / 362880, -1 / 39916800)  # Taylor, from a^3 on
 _COSINE: Final = (-1 / 2, 1 / 24, -1 / 720, 1 / 40320, -1 / 3628800)  # from a^2 on
 

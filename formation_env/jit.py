@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any, Final, TypeVar, cast
 
 import numba
+from numba.extending import register_jitable
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -19,13 +20,9 @@ LANES: Final = 32
 FAST_MATH: Final = False
 
 
+_ARITHMETIC: Final[dict[str, Any]] = {"fastmath": FAST_MATH, "error_model": "numpy"}
 # Only compiled code calls these, so they need no way in from Python or C, which saves a quarter of the compile time.
-_INNER: Final[dict[str, Any]] = {
-    "no_cpython_wrapper": True,
-    "no_cfunc_wrapper": True,
-    "fastmath": FAST_MATH,
-    "error_model": "numpy",
-}
+_INNER: Final[dict[str, Any]] = {**_ARITHMETIC, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def lane(function: F) -> F:
@@ -36,3 +33,9 @@ def lane(function: F) -> F:
 def stage(function: F) -> F:
     """Compile a function that runs a few lane functions over the rows of a tile."""
     return cast(F, numba.njit(**_INNER)(function))
+
+
+def shared(function: F) -> F:
+    """Leave a function of scalars or arrays to Python as it is, and inline it where compiled code calls it."""
+    wrapped: F = register_jitable(**_ARITHMETIC, forceinline=True)(function)
+    return wrapped

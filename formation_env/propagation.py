@@ -1,11 +1,13 @@
-"""Force-free propagation of relative states."""
+"""Propagation of relative states without thrust."""
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from formation_env.dynamics import discretise, get_dynamics
+from formation_env.dynamics import NONLINEAR, get_dynamics
 from formation_env.dynamics.base import Array
+from formation_env.dynamics.nonlinear import World, relative_path
 from formation_env.orbit import Orbit
+from formation_env.perturbations import Perturbations
 from formation_env.spacecraft import Spacecraft
 
 
@@ -17,16 +19,18 @@ def propagate(
     orbit: Orbit | None = None,
     spacecraft: Spacecraft | None = None,
     leader_spacecraft: Spacecraft | None = None,
+    perturbations: Perturbations | None = None,
 ) -> Array:
-    """Relative states of a follower that does not thrust, exact for the linear model.
+    """Relative states of a follower that does not thrust: exact for a linear model, to a millimetre a day otherwise.
 
     Args:
         initial_state: LVLH states (..., 6) at t = 0: [x, y, z, x', y', z'], m and m/s.
         times_s: times (T,), s, in any order; negative ones run backwards.
-        dynamics: name of a model in `formation_env.dynamics.DYNAMICS`.
+        dynamics: name of a model in `formation_env.dynamics.DYNAMICS`, or `nonlinear`.
         orbit: the leader's orbit; the thesis's by default.
         spacecraft: the follower; the thesis's by default.
         leader_spacecraft: the leader; like the follower by default.
+        perturbations: what acts in the nonlinear truth beside gravity.
 
     Returns:
         States (..., T, 6), m and m/s.
@@ -43,6 +47,20 @@ def propagate(
     leader = leader_spacecraft or follower
     if leader.air_density_kg_m3 != follower.air_density_kg_m3:
         raise ValueError("leader_spacecraft.air_density_kg_m3: must be the follower's, they fly through the same air")
-    model = discretise(get_dynamics(dynamics), times, orbit or Orbit(), follower, leader)
+    orbit = orbit or Orbit()
+    if dynamics == NONLINEAR:
+        return _nonlinear(states, times, World(orbit, perturbations or Perturbations()), follower, leader)
+    model = get_dynamics(dynamics).discretise(0.0, times, orbit, follower, leader)
     path: Array = np.einsum("tij,...j->...ti", model.Phi, states) + model.delta
     return path
+
+
+def _nonlinear(states: Array, times_s: Array, world: World, follower: Spacecraft, leader: Spacecraft) -> Array:
+    """States (..., T, 6) of the nonlinear truth at times in any order."""
+    path = np.empty((len(times_s), *states.shape))
+    for sign, side in ((1.0, times_s >= 0), (-1.0, times_s < 0)):
+        instants, places = np.unique(np.abs(times_s[side]), return_inverse=True)
+        if len(instants):
+            flown = relative_path(world, follower, leader, states.reshape(-1, 6), sign * instants)
+            path[side] = flown[places].reshape(-1, *states.shape)
+    return np.moveaxis(path, 0, -2)

@@ -6,13 +6,16 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Literal, Self
 
+import numpy as np
 from pydantic import model_validator
 
 from formation_env.dropout import AnyDropout, GilbertElliott
-from formation_env.dynamics import DYNAMICS, DiscreteModel, discretise, get_dynamics
+from formation_env.dynamics import DYNAMICS, NONLINEAR, DiscreteModel, get_dynamics
+from formation_env.dynamics.nonlinear import World
 from formation_env.estimation import Belief, KalmanFilter, Sensor
 from formation_env.formations import AnyFormation, AtLeader
 from formation_env.orbit import Orbit
+from formation_env.perturbations import Perturbations
 from formation_env.settings import ConfigError, NonNegative, Positive, Text, build, load_yaml, nearest, settings
 from formation_env.spacecraft import Spacecraft
 
@@ -88,7 +91,8 @@ class Scenario:
         orbit: the leader's orbit.
         spacecraft: the follower.
         leader_spacecraft: the leader; like the follower if left out.
-        dynamics: name of the true dynamics model.
+        dynamics: name of the true dynamics: a linear model, or `nonlinear`.
+        perturbations: what acts in the nonlinear truth beside gravity.
         process_noise_m_s2: 1-sigma of a random acceleration of each axis, held over a step, m/s^2.
         sensor: relative navigation.
         filter: what the Kalman filter believes.
@@ -106,6 +110,7 @@ class Scenario:
     spacecraft: Spacecraft = Spacecraft()
     leader_spacecraft: Spacecraft | None = None
     dynamics: Text = "modified_hcw"
+    perturbations: Perturbations = Perturbations()
     process_noise_m_s2: NonNegative = 5e-6
     sensor: Sensor = Sensor()
     filter: KalmanFilter = KalmanFilter()
@@ -120,9 +125,12 @@ class Scenario:
     @model_validator(mode="after")
     def _check(self) -> Self:
         """Refuse what no single field can: unknown models, times that do not fit the step, an impossible start."""
-        for key, name in (("dynamics", self.dynamics), ("filter.dynamics", self.filter.dynamics)):
-            if name is not None and name not in DYNAMICS:
-                raise ValueError(f"{key}: no dynamics model named {name!r}; {nearest(name, DYNAMICS)}")
+        for key, name, known in (
+            ("dynamics", self.dynamics, [*DYNAMICS, NONLINEAR]),
+            ("filter.dynamics", self.filter.dynamics, [*DYNAMICS]),
+        ):
+            if name is not None and name not in known:
+                raise ValueError(f"{key}: no dynamics model named {name!r}; {nearest(name, known)}")
         least, greatest = self.spacecraft.min_accel_m_s2, math.sqrt(3) * self.spacecraft.max_accel_m_s2
         if least > greatest:
             raise ValueError(
@@ -165,16 +173,18 @@ class Scenario:
                 f"start.formation: {range_m:.6g} m from the leader, inside limits.keep_out_m = "
                 f"{self.limits.keep_out_m:g} m"
             )
+        start_s = 0.0
         for index, phase in enumerate(self.phases):
-            transfer_s, hold_s = (self.steps(p) * self.dt_s for p in (phase.transfer_periods, phase.hold_periods))
-            distance_m = math.dist(place, phase.formation.reference(-transfer_s, self.orbit)[:3])
+            arrival_s = start_s + self.steps(phase.transfer_periods) * self.dt_s
+            end_s = arrival_s + self.steps(phase.hold_periods) * self.dt_s
+            distance_m = math.dist(place, phase.formation.reference(start_s, self.orbit, arrival_s)[:3])
             if distance_m > self.limits.max_distance_m:
                 key = f"phases.{index}.formation" if index else "start.formation"
                 raise ValueError(
                     f"{key}: {distance_m:.6g} m between the {'phase before' if index else 'start'} and the phase's "
                     f"reference, beyond limits.max_distance_m = {self.limits.max_distance_m:g} m"
                 )
-            place = phase.formation.reference(hold_s, self.orbit)[:3]
+            place, start_s = phase.formation.reference(end_s, self.orbit, arrival_s)[:3], end_s
 
     def steps(self, periods: float) -> int:
         """A time in orbital periods as the nearest number of whole steps."""
@@ -195,15 +205,24 @@ class Scenario:
         """The leader's spacecraft."""
         return self.leader_spacecraft or self.spacecraft
 
+    @property
+    def world(self) -> World:
+        """What the nonlinear truth is made of."""
+        return World(self.orbit, self.perturbations)
+
     def true_model(self) -> DiscreteModel:
-        """The true dynamics over one step."""
-        return discretise(get_dynamics(self.dynamics), self.dt_s, self.orbit, self.spacecraft, self.leader)
+        """The true linear dynamics over one step (6, 6), or over each of the steps (num_steps, 6, 6) if they vary.
+
+        Raises:
+            ValueError: the truth is nonlinear.
+        """
+        return self._model(self.dynamics, self.orbit, self.spacecraft, self.leader)
 
     @property
     def belief(self) -> Belief:
         """What the filter believes, in full."""
         truth = Belief(
-            dynamics=self.dynamics,
+            dynamics=self._believable,
             sigma_pos_m=self.sensor.sigma_pos_m,
             sigma_vel_m_s=self.sensor.sigma_vel_m_s,
             process_noise_m_s2=self.process_noise_m_s2,
@@ -216,11 +235,23 @@ class Scenario:
         own = {field.name: getattr(self.filter, field.name) for field in fields(truth)}
         return replace(truth, **{name: value for name, value in own.items() if value is not None})
 
-    def filter_model(self, step_s: float | None = None) -> DiscreteModel:
-        """The dynamics that the filter believes, over one step or over step_s, s (an array gives an array)."""
-        belief, step_s = self.belief, self.dt_s if step_s is None else step_s
+    @property
+    def _believable(self) -> str:
+        """The linear model nearest to the truth."""
+        if self.dynamics != NONLINEAR:
+            return self.dynamics
+        return "yamanaka_ankersen" if self.orbit.eccentricity > 0 else "modified_hcw"
+
+    def filter_model(self) -> DiscreteModel:
+        """The dynamics that the filter believes: over one step (6, 6), or over each (num_steps, 6, 6) if they vary."""
+        belief = self.belief
         leader = self.leader_spacecraft or belief.spacecraft
-        return discretise(get_dynamics(belief.dynamics), step_s, belief.orbit, belief.spacecraft, leader)
+        return self._model(belief.dynamics, belief.orbit, belief.spacecraft, leader)
+
+    def _model(self, name: str, orbit: Orbit, spacecraft: Spacecraft, leader: Spacecraft) -> DiscreteModel:
+        dynamics = get_dynamics(name)
+        starts_s = 0.0 if dynamics.time_invariant else self.dt_s * np.arange(self.num_steps)
+        return dynamics.discretise(starts_s, self.dt_s, orbit, spacecraft, leader)
 
 
 MAX_STEPS = 1_000_000

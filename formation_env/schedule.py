@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, Array
+from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, Array, DiscreteModel
 from formation_env.observation import BOUND, LEAST_LENGTH_M, ObservationLayout
 from formation_env.scenario import Phase, Scenario
 
@@ -63,7 +63,8 @@ def legs(scenario: Scenario) -> list[Leg]:
 
 def leg_reference(scenario: Scenario, leg: Leg, steps: ArrayLike) -> Array:
     """Reference states (..., 6) of a leg at instants (...), in steps: on the way to the arrival and after it."""
-    return leg.phase.formation.reference((np.asarray(steps) - leg.arrival) * scenario.dt_s, scenario.orbit)
+    times_s = np.asarray(steps) * scenario.dt_s
+    return leg.phase.formation.reference(times_s, scenario.orbit, leg.arrival * scenario.dt_s)
 
 
 def observation_layout(scenario: Scenario) -> ObservationLayout:
@@ -111,7 +112,7 @@ def _fill_plan(table: Array, scenario: Scenario, leg: Leg) -> None:
     in_force = slice(leg.start, leg.end + 1)
     reference = leg_reference(scenario, leg, steps)
     coast_steps = np.maximum(leg.arrival - steps, 0)
-    Phi, delta = _coasts(scenario, leg.arrival - leg.start)
+    Phi, delta = _coasts(scenario.filter_model().steps(leg.start, leg.arrival))
     goal = leg_reference(scenario, leg, np.maximum(steps, leg.arrival))
     _columns(table, "reference")[in_force] = reference
     _columns(table, "coast_in_plane")[in_force] = Phi[np.ix_(coast_steps, IN_PLANE, IN_PLANE)].reshape(-1, 16)
@@ -124,17 +125,21 @@ def _fill_plan(table: Array, scenario: Scenario, leg: Leg) -> None:
     _column(table, "time_left")[in_force] = (leg.end - steps) * scenario.dt_s / period_s
 
 
-def _coasts(scenario: Scenario, count: int) -> tuple[Array, Array]:
-    """Coasting for 0 to count steps by the filter's model, step after step.
+def _coasts(model: DiscreteModel) -> tuple[Array, Array]:
+    """Coasting through the last 0 to count steps.
+
+    Args:
+        model: of each step (count, ...).
 
     Returns:
         Transition matrices (count + 1, 6, 6) and the effects of the constant disturbance (count + 1, 6).
     """
-    step = scenario.filter_model()
+    count = len(model.Phi)
     Phi, delta = np.tile(np.eye(6), (count + 1, 1, 1)), np.zeros((count + 1, 6))
     for k in range(count):
-        Phi[k + 1] = step.Phi @ Phi[k]
-        delta[k + 1] = step.Phi @ delta[k] + step.delta
+        step = count - 1 - k
+        Phi[k + 1] = Phi[k] @ model.Phi[step]
+        delta[k + 1] = Phi[k] @ model.delta[step] + delta[k]
     return Phi, delta
 
 

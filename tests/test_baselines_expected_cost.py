@@ -40,7 +40,7 @@ def test_predicted_scatter_is_what_is_flown() -> None:
     """
     scenario = dataclasses.replace(load_scenario("initialization"), dropout=NoDropout())
     scenario = dataclasses.replace(scenario, spacecraft=dataclasses.replace(scenario.spacecraft, max_accel_m_s2=0.05))
-    leg, model, rows = legs(scenario)[0], scenario.filter_model(), 1000
+    leg, model, rows = legs(scenario)[0], scenario.filter_model().steps(0, scenario.num_steps), 1000
     known = knowledge(scenario, model)
     gains = expected_cost_gains(scenario)[0]
     predicted = spread(

@@ -12,12 +12,13 @@ from scipy.sparse import eye, kron, vstack
 from baselines import make_policy
 from baselines.guidance import least_fuel_path
 from baselines.lqr_tracking import tracking_gains
-from baselines.riccati import continuous_gain, finite_horizon_gains, stationary_gain
+from baselines.riccati import continuous_gain, finite_horizon_gains, stationary
 from baselines.timeline import nominal_start
 from baselines.weights import Weights
 from formation_env import load_scenario
-from formation_env.dynamics import HCW, ModifiedHCW, transition_matrix
+from formation_env.dynamics import HCW, ModifiedHCW
 from formation_env.dynamics.base import Array, control_matrix
+from formation_env.dynamics.hcw import transition_matrix
 from formation_env.scenario import Scenario
 from formation_env.schedule import Leg, legs
 
@@ -40,7 +41,7 @@ def test_discrete_gain_agrees_with_scipy(weights: Weights, dt_s: float) -> None:
     model, Q, R = scenario.filter_model(), weights.Q(), weights.R(scenario.orbit)
     P = solve_discrete_are(model.Phi, model.Gamma, Q, R)
     expected = np.linalg.solve(R + model.Gamma.T @ P @ model.Gamma, model.Gamma.T @ P @ model.Phi)
-    np.testing.assert_allclose(stationary_gain(model.Phi, model.Gamma, Q, R), expected, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(stationary(model.Phi, model.Gamma, Q, R)[0], expected, rtol=1e-6, atol=1e-12)
 
 
 def test_continuous_gain_agrees_with_scipy(weights: Weights) -> None:
@@ -75,7 +76,7 @@ def test_long_finite_horizon_is_the_infinite_one(weights: Weights) -> None:
     scenario = load_scenario("keeping")
     model, Q, R = scenario.filter_model(), weights.Q(), weights.R(scenario.orbit)
     gains = finite_horizon_gains(model.Phi, model.Gamma, Q, np.tile(R, (3000, 1, 1)), 10 * Q)
-    expected = stationary_gain(model.Phi, model.Gamma, Q, R)
+    expected = stationary(model.Phi, model.Gamma, Q, R)[0]
     np.testing.assert_allclose(gains[0], expected, rtol=1e-5, atol=1e-6 * np.abs(expected).max())
     assert np.abs(gains[-1] - expected).max() > 0.1 * np.abs(expected).max()
 

@@ -12,15 +12,8 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import expm
 
-from formation_env.dynamics import (
-    DYNAMICS,
-    HCW,
-    ModifiedHCW,
-    PrintedHCW,
-    discretise,
-    get_dynamics,
-    transition_matrix,
-)
+from formation_env.dynamics import DYNAMICS, HCW, ModifiedHCW, PrintedHCW, get_dynamics
+from formation_env.dynamics.hcw import transition_matrix
 from formation_env.orbit import Orbit
 from formation_env.propagation import propagate
 from formation_env.spacecraft import Spacecraft
@@ -240,7 +233,7 @@ def test_discretisation_solves_the_equations(
     name: str, rates: Callable[[Array, Array], Array], step_s: float, state: list[float], thrust: list[float]
 ) -> None:
     """Phi x + Gamma u + delta is the solution of the ODE with u held (DOP853 to 1e-12 of the largest value)."""
-    model = discretise(get_dynamics(name), step_s, ORBIT, DENSE, DENSE_LEADER)
+    model = get_dynamics(name).discretise(0.0, step_s, ORBIT, DENSE, DENSE_LEADER)
     actual = model.Phi @ state + model.Gamma @ thrust + model.delta
     solution = solve_ivp(lambda _, s: rates(s, thrust), (0, step_s), state, "DOP853", rtol=1e-12, atol=1e-12)
     scale = max(1.0, np.abs(solution.y).max())
@@ -250,10 +243,10 @@ def test_discretisation_solves_the_equations(
 def test_many_steps_at_once_equal_one_by_one() -> None:
     """An array of steps gives, along its axes, what each step gives alone."""
     steps = np.array([[0.0, 1.0], [30.0, -500.0]])
-    together = discretise(ModifiedHCW(), steps, ORBIT, DENSE, DENSE_LEADER)
+    together = ModifiedHCW().discretise(0.0, steps, ORBIT, DENSE, DENSE_LEADER)
     assert together.Phi.shape == (2, 2, 6, 6)
     for index in np.ndindex(steps.shape):
-        alone = discretise(ModifiedHCW(), steps[index], ORBIT, DENSE, DENSE_LEADER)
+        alone = ModifiedHCW().discretise(0.0, steps[index], ORBIT, DENSE, DENSE_LEADER)
         np.testing.assert_array_equal(together.Phi[index], alone.Phi)
         np.testing.assert_array_equal(together.Gamma[index], alone.Gamma)
         np.testing.assert_array_equal(together.delta[index], alone.delta)
@@ -262,7 +255,7 @@ def test_many_steps_at_once_equal_one_by_one() -> None:
 @pytest.mark.parametrize("name", DYNAMICS)
 def test_orbit_plane_and_cross_track_do_not_mix(name: str) -> None:
     """The contract that lets the filter treat them apart: no element of A, Gamma or d couples them."""
-    model = discretise(get_dynamics(name), 30.0, ORBIT, DENSE, DENSE_LEADER)
+    model = get_dynamics(name).discretise(0.0, 30.0, ORBIT, DENSE, DENSE_LEADER)
     plane, normal = np.array([0, 1, 3, 4]), np.array([2, 5])
     assert not model.Phi[np.ix_(plane, normal)].any()
     assert not model.Phi[np.ix_(normal, plane)].any()

@@ -9,14 +9,14 @@ from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
 from formation_env import estimation
-from formation_env.dynamics import HCW, discretise
+from formation_env.dynamics import HCW
 from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE
 from formation_env.estimation import process_noise_covariance, upper_triangle
 from formation_env.orbit import Orbit
 from formation_env.spacecraft import Spacecraft
 
 ORBIT = Orbit()
-MODEL = discretise(HCW(), 30.0, ORBIT, Spacecraft(), Spacecraft())
+MODEL = HCW().discretise(0.0, 30.0, ORBIT, Spacecraft(), Spacecraft())
 Row = tuple[float, ...]
 Pair = tuple[float, float]
 Update = tuple[Row, Row, float]

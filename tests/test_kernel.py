@@ -41,7 +41,7 @@ def test_unpack_reads_what_pack_wrote(name: str) -> None:
     groups = unpacked(settings)
     flat = np.concatenate([np.ravel(values) for group in groups for values in group])
     np.testing.assert_array_equal(flat, settings)
-    truth, believed, noises, scalars = groups
+    truth, believed, _, sensor, _, scalars = groups
     for model, expected in ((truth, scenario.true_model()), (believed, scenario.filter_model())):
         Phi, Gamma = np.zeros((6, 6)), np.zeros((6, 3))
         Phi[np.ix_([0, 1, 3, 4], [0, 1, 3, 4])] = np.reshape(model.Phi_in_plane, (4, 4))
@@ -50,7 +50,7 @@ def test_unpack_reads_what_pack_wrote(name: str) -> None:
         Gamma[[2, 5], 2] = model.Gamma_cross_track
         np.testing.assert_array_equal(Phi, expected.Phi)
         np.testing.assert_array_equal(Gamma, expected.Gamma)
-    assert noises.variances == (9.0, scenario.sensor.sigma_vel_m_s**2)
+    assert sensor.variances == (9.0, scenario.sensor.sigma_vel_m_s**2)
     assert scalars._asdict() == packing._scalars(scenario)._asdict()
     assert scalars.dt_s == scenario.dt_s
     assert scalars.num_steps == scenario.num_steps
@@ -97,7 +97,7 @@ def imported_modules(tree: ast.AST) -> dict[str, str]:
 def is_compiled(function: ast.FunctionDef) -> bool:
     """Whether numba compiles a function, by its decorator."""
     names = {node.id for item in function.decorator_list for node in ast.walk(item) if isinstance(node, ast.Name)}
-    return bool(names & {"lane", "stage", "compiled", "numba"})
+    return bool(names & {"lane", "stage", "shared", "compiled", "numba"})
 
 
 def names_at_work(tree: ast.Module) -> Iterator[str]:
@@ -133,7 +133,7 @@ def test_the_hash_covers_all_that_is_compiled() -> None:
     assert covered <= set(TREES)
 
 
-@pytest.mark.parametrize("module", [*program.COMPILED_MODULES, "kernel/lanes", "kernel/tile", "kernel/packing"])
+@pytest.mark.parametrize("module", [*program.COMPILED_MODULES, "kernel/lanes", "kernel/tile", "kernel/truth"])
 def test_the_hash_changes_with_each_source(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, module: str) -> None:
     """One changed character in any of the files gives another key of the cache."""
     copy = tmp_path / "formation_env"

@@ -1,16 +1,27 @@
-"""Models of the relative motion. To add one: a file with a class that has `Dynamics`' methods, and a line here."""
+"""Models of the relative motion. To add a linear one: a file with a `Dynamics` subclass, and a line here."""
 
-from formation_env.dynamics.base import DiscreteModel, Dynamics, discretise
-from formation_env.dynamics.hcw import HCW, transition_matrix
+from typing import Final
+
+from formation_env.dynamics.base import DiscreteModel, Dynamics
+from formation_env.dynamics.hcw import HCW
 from formation_env.dynamics.modified_hcw import ModifiedHCW
 from formation_env.dynamics.printed_hcw import PrintedHCW
+from formation_env.dynamics.yamanaka_ankersen import YamanakaAnkersen
 from formation_env.settings import nearest
 
-DYNAMICS: dict[str, type[Dynamics]] = {"hcw": HCW, "modified_hcw": ModifiedHCW, "printed_hcw": PrintedHCW}
+DYNAMICS: dict[str, type[Dynamics]] = {
+    "hcw": HCW,
+    "modified_hcw": ModifiedHCW,
+    "printed_hcw": PrintedHCW,
+    "yamanaka_ankersen": YamanakaAnkersen,
+}
+
+NONLINEAR: Final = "nonlinear"
+"""Name of the truth that is no linear model, see `formation_env.dynamics.nonlinear`."""
 
 
 def get_dynamics(name: str) -> Dynamics:
-    """The dynamics model of that name.
+    """The linear model of that name.
 
     Raises:
         ValueError: there is none of that name.
@@ -23,11 +34,11 @@ def get_dynamics(name: str) -> Dynamics:
 __all__ = [
     "DYNAMICS",
     "HCW",
+    "NONLINEAR",
     "DiscreteModel",
     "Dynamics",
     "ModifiedHCW",
     "PrintedHCW",
-    "discretise",
+    "YamanakaAnkersen",
     "get_dynamics",
-    "transition_matrix",
 ]

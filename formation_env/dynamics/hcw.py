@@ -3,15 +3,15 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from formation_env.dynamics.base import Array
+from formation_env.dynamics.base import Array, Dynamics
 from formation_env.orbit import Orbit
 from formation_env.spacecraft import Spacecraft
 
 
-class HCW:
+class HCW(Dynamics):
     """Relative motion about a circular Keplerian orbit (Ma 2009, eq. 2.54-2.56; Clohessy & Wiltshire 1960)."""
 
-    def state_matrix(self, orbit: Orbit, spacecraft: Spacecraft) -> Array:
+    def state_matrix(self, orbit: Orbit, spacecraft: Spacecraft, times_s: ArrayLike = 0.0) -> Array:
         """A (6, 6); the spacecraft plays no part."""
         n = orbit.mean_motion_rad_s
         A = np.zeros((6, 6))

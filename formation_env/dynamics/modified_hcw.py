@@ -3,21 +3,22 @@
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from formation_env.constants import R_EARTH
-from formation_env.dynamics.base import Array
+from formation_env.dynamics.base import Array, Dynamics
 from formation_env.orbit import Orbit
 from formation_env.spacecraft import Spacecraft
 
 
-class ModifiedHCW:
+class ModifiedHCW(Dynamics):
     """Relative motion under J2 and drag (Ma 2009, eq. 2.57-2.70; Schweighart & Sedwick 2002).
 
     In the thesis both spacecraft have the same ballistic coefficient; where they differ, the leader's and the
     follower's drag differ by a constant along-track acceleration.
     """
 
-    def state_matrix(self, orbit: Orbit, spacecraft: Spacecraft) -> Array:
+    def state_matrix(self, orbit: Orbit, spacecraft: Spacecraft, times_s: ArrayLike = 0.0) -> Array:
         """A (6, 6)."""
         n, r, i = orbit.mean_motion_rad_s, orbit.radius_m, orbit.inclination_rad
         oblateness = orbit.j2_coefficient * (R_EARTH / r) ** 2

@@ -2,6 +2,8 @@
 
 import math
 
+from numpy.typing import ArrayLike
+
 from formation_env.constants import R_EARTH
 from formation_env.dynamics.base import Array
 from formation_env.dynamics.modified_hcw import ModifiedHCW
@@ -16,9 +18,9 @@ class PrintedHCW(ModifiedHCW):
     spacecraft moves like this; it is here because the thesis's closed-loop figures come out with it, and only with it.
     """
 
-    def state_matrix(self, orbit: Orbit, spacecraft: Spacecraft) -> Array:
+    def state_matrix(self, orbit: Orbit, spacecraft: Spacecraft, times_s: ArrayLike = 0.0) -> Array:
         """A (6, 6)."""
-        A = super().state_matrix(orbit, spacecraft)
+        A = super().state_matrix(orbit, spacecraft, times_s)
         n = orbit.mean_motion_rad_s
         missing_n = (
             3 / 2 * orbit.j2_coefficient * (R_EARTH / orbit.radius_m) ** 2 * math.cos(orbit.inclination_rad) ** 2

@@ -5,8 +5,10 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import ArrayLike
 
+from formation_env.constants import MU_EARTH
 from formation_env.dynamics.base import Array
 from formation_env.dynamics.hcw import transition_matrix
+from formation_env.dynamics.yamanaka_ankersen import transition_matrix as elliptic_transition_matrix
 from formation_env.orbit import Orbit
 
 
@@ -16,20 +18,47 @@ class Formation(ABC):
     kind: str
 
     @abstractmethod
-    def state(self, orbit: Orbit) -> Array:
-        """LVLH state (6,) at t = 0, m and m/s."""
+    def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
+        """LVLH state (6,), m and m/s, with which the formation begins at a time, s; it matters on an ellipse only."""
 
-    def reference(self, times_s: ArrayLike, orbit: Orbit) -> Array:
-        """The force-free HCW path through `state`, states (..., 6) at times (...), s, before and after t = 0."""
-        path: Array = transition_matrix(orbit.mean_motion_rad_s, times_s) @ self.state(orbit)
+    def reference(self, times_s: ArrayLike, orbit: Orbit, begin_s: float = 0.0) -> Array:
+        """The force-free Keplerian path through `state`, states (..., 6) at times (...), s, before and after it begins.
+
+        Args:
+            times_s: times (...), s.
+            orbit: the leader's.
+            begin_s: when the follower has `state`, s.
+        """
+        if orbit.eccentricity > 0:
+            Phi = elliptic_transition_matrix(orbit, begin_s, times_s)
+        else:
+            Phi = transition_matrix(orbit.mean_motion_rad_s, np.asarray(times_s, float) - begin_s)
+        path: Array = Phi @ self.state(orbit, begin_s)
         return path
 
 
-def closed_ellipse(x0: float, vx0: float, z_per_x: float, mean_motion_rad_s: float) -> Array:
+def closed_ellipse(x0: float, vx0: float, z_per_x: float, orbit: Orbit, time_s: float) -> Array:
     """State (6,) of a leader-centred ellipse without drift (Ma 2009, section 3.1).
 
-    No drift needs y0' = -2 n x0; centred on the leader, y0 = 2 x0' / n; the cross-track motion is z_per_x times the
-    radial one, in phase with it.
+    On a circular orbit no drift needs y0' = -2 n x0; centred on the leader, y0 = 2 x0' / n; the cross-track motion is
+    z_per_x times the radial one, in phase with it. On an ellipse y0' follows from equal energies.
     """
-    n = mean_motion_rad_s
-    return np.array([x0, 2 * vx0 / n, z_per_x * x0, vx0, -2 * n * x0, z_per_x * vx0])
+    y0 = 2 * vx0 / orbit.mean_motion_rad_s
+    return np.array([x0, y0, z_per_x * x0, vx0, closing_speed(x0, y0, vx0, orbit, time_s), z_per_x * vx0])
+
+
+def closing_speed(x0: float, y0: float, vx0: float, orbit: Orbit, time_s: float) -> float:
+    """The along-track velocity, m/s, with which a follower has the leader's energy to first order, so its period."""
+    r, speed, rate = orbit.polar_motion(time_s)
+    # r' (x' - theta' y) + r theta' (y' + theta' x) + mu x / r^2 = 0
+    return -rate * x0 - (speed * (vx0 - rate * y0) + MU_EARTH * x0 / r**2) / (r * rate)
+
+
+def need_circle(kind: str, orbit: Orbit) -> None:
+    """Refuse an elliptic orbit.
+
+    Raises:
+        ValueError: the leader's orbit is not circular.
+    """
+    if orbit.eccentricity > 0:
+        raise ValueError(f"formation {kind}: needs a circular orbit, got eccentricity {orbit.eccentricity:g}")

@@ -22,9 +22,9 @@ class XYEllipse(Formation):
     x0_m: Real = 2000.0
     vx0_m_s: Real = 0.0
 
-    def state(self, orbit: Orbit) -> Array:
+    def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
         """LVLH state (6,), m and m/s."""
-        return closed_ellipse(self.x0_m, self.vx0_m_s, 0.0, orbit.mean_motion_rad_s)
+        return closed_ellipse(self.x0_m, self.vx0_m_s, 0.0, orbit, time_s)
 
 
 @settings
@@ -40,9 +40,9 @@ class SpaceCircle(Formation):
     x0_m: Real = 2000.0
     vx0_m_s: Real = 0.2
 
-    def state(self, orbit: Orbit) -> Array:
+    def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
         """LVLH state (6,), m and m/s."""
-        return closed_ellipse(self.x0_m, self.vx0_m_s, math.sqrt(3), orbit.mean_motion_rad_s)
+        return closed_ellipse(self.x0_m, self.vx0_m_s, math.sqrt(3), orbit, time_s)
 
 
 @settings
@@ -58,6 +58,6 @@ class ProjectedCircle(Formation):
     x0_m: Real = 0.0
     vx0_m_s: Real = 1.0
 
-    def state(self, orbit: Orbit) -> Array:
+    def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
         """LVLH state (6,), m and m/s."""
-        return closed_ellipse(self.x0_m, self.vx0_m_s, 2.0, orbit.mean_motion_rad_s)
+        return closed_ellipse(self.x0_m, self.vx0_m_s, 2.0, orbit, time_s)

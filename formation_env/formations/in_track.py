@@ -7,7 +7,7 @@ import numpy as np
 
 from formation_env.constants import OMEGA_EARTH
 from formation_env.dynamics.base import Array
-from formation_env.formations.base import Formation
+from formation_env.formations.base import Formation, need_circle
 from formation_env.orbit import Orbit
 from formation_env.settings import Real, settings
 
@@ -23,7 +23,8 @@ class InTrack(Formation):
     kind: Literal["in_track"] = "in_track"
     y0_m: Real = 2000.0
 
-    def state(self, orbit: Orbit) -> Array:
+    def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
         """LVLH state (6,), m and m/s: z = y0 (w_E / n) sin i cos nt."""
+        need_circle(self.kind, orbit)
         amplitude = self.y0_m * OMEGA_EARTH / orbit.mean_motion_rad_s * math.sin(orbit.inclination_rad)
         return np.array([0, self.y0_m, amplitude, 0, 0, 0])

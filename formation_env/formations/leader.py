@@ -16,6 +16,6 @@ class AtLeader(Formation):
 
     kind: Literal["at_leader"] = "at_leader"
 
-    def state(self, orbit: Orbit) -> Array:
+    def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
         """LVLH state (6,): zero."""
         return np.zeros(6)

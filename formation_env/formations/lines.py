@@ -4,8 +4,9 @@ from typing import Literal
 
 import numpy as np
 
+from formation_env.constants import MU_EARTH
 from formation_env.dynamics.base import Array
-from formation_env.formations.base import Formation
+from formation_env.formations.base import Formation, need_circle
 from formation_env.orbit import Orbit
 from formation_env.settings import Real, settings
 
@@ -21,9 +22,13 @@ class Following(Formation):
     kind: Literal["following"] = "following"
     y0_m: Real = 2000.0
 
-    def state(self, orbit: Orbit) -> Array:
-        """LVLH state (6,), m and m/s."""
-        return np.array([0, self.y0_m, 0, 0, 0, 0])
+    def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
+        """LVLH state (6,), m and m/s: the leader's own motion, y0 / (r theta') seconds ahead of it."""
+        r, speed, rate = orbit.polar_motion(time_s)
+        ahead_s = self.y0_m / (r * rate)
+        # d/dt (r', r theta') = (r'', -r' theta'), r'' = e cos(theta) mu / r^2
+        outward = orbit.eccentricity * np.cos(orbit.true_anomaly_rad(time_s)) * MU_EARTH / r**2
+        return np.array([ahead_s * speed, self.y0_m, 0, ahead_s * outward, -ahead_s * speed * rate, 0])
 
 
 @settings
@@ -37,6 +42,7 @@ class Parallel(Formation):
     kind: Literal["parallel"] = "parallel"
     x0_m: Real = 1000.0
 
-    def state(self, orbit: Orbit) -> Array:
+    def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
         """LVLH state (6,), m and m/s."""
+        need_circle(self.kind, orbit)
         return np.array([self.x0_m, 0, 0, 0, -1.5 * orbit.mean_motion_rad_s * self.x0_m, 0])

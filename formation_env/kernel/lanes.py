@@ -9,12 +9,12 @@ from typing import Final
 
 import numpy as np
 
-from formation_env import estimation, observation, streams
+from formation_env import observation, streams
 from formation_env.dynamics.base import Array
 from formation_env.fastmath import log, to_bits, to_integer
 from formation_env.jit import LANES, lane
 from formation_env.kernel import tile as f
-from formation_env.kernel.packing import Model, Noises, Scalars
+from formation_env.kernel.packing import Scalars
 
 # Offsets of the schedule's columns and of the observation's blocks, as the compiler needs them: constants.
 REFERENCE: Final = f.plan("reference")
@@ -97,31 +97,6 @@ def thruster(t: Array, i: int, c: Scalars) -> None:
 
 
 @lane
-def _propagate(t: Array, i: int, state: int, model: Model, ax: float, ay: float, az: float) -> None:
-    """x(k+1) = Phi x(k) + Gamma a + delta, in place."""
-    x, y, u, v = t[state + i], t[state + LANES + i], t[state + 3 * LANES + i], t[state + 4 * LANES + i]
-    z, w = t[state + 2 * LANES + i], t[state + 5 * LANES + i]
-    P, G, d = model.Phi_in_plane, model.Gamma_in_plane, model.delta_in_plane
-    t[state + i] = P[0] * x + P[1] * y + P[2] * u + P[3] * v + G[0] * ax + G[1] * ay + d[0]
-    t[state + LANES + i] = P[4] * x + P[5] * y + P[6] * u + P[7] * v + G[2] * ax + G[3] * ay + d[1]
-    t[state + 3 * LANES + i] = P[8] * x + P[9] * y + P[10] * u + P[11] * v + G[4] * ax + G[5] * ay + d[2]
-    t[state + 4 * LANES + i] = P[12] * x + P[13] * y + P[14] * u + P[15] * v + G[6] * ax + G[7] * ay + d[3]
-    p, g, e = model.Phi_cross_track, model.Gamma_cross_track, model.delta_cross_track
-    t[state + 2 * LANES + i] = p[0] * z + p[1] * w + g[0] * az + e[0]
-    t[state + 5 * LANES + i] = p[2] * z + p[3] * w + g[1] * az + e[1]
-
-
-@lane
-def truth_dynamics(t: Array, i: int, model: Model, c: Scalars) -> None:
-    """The true state over one step, with thrust and random acceleration held."""
-    n = FIRST_PROCESS_NOISE + i
-    ax = t[f.THRUST + i] + c.process_noise * t[n]
-    ay = t[f.THRUST + LANES + i] + c.process_noise * t[n + LANES]
-    az = t[f.THRUST + 2 * LANES + i] + c.process_noise * t[n + 2 * LANES]
-    _propagate(t, i, f.TRUTH, model, ax, ay, az)
-
-
-@lane
 def link(t: Array, i: int, c: Scalars) -> None:
     """One transition of the link's chain."""
     down = c.link_fail if t[f.LINK_UP + i] > 0.5 else 1.0 - c.link_recover
@@ -134,85 +109,6 @@ def dropout(t: Array, i: int, c: Scalars) -> None:
     measured = t[f.LINK_UP + i] * (1.0 - t[LINK_CLOSED + i])
     t[f.MEASURED + i] = measured
     t[f.AGE + i] = 0.0 if measured > 0.5 else t[f.AGE + i] + c.dt_s
-
-
-@lane
-def filter_time_update(t: Array, i: int, model: Model, belief: Noises) -> None:
-    """The estimate and its covariance over one step (Ma 2009, eq. 4.74-4.75)."""
-    ax, ay, az = t[f.COMMAND + i], t[f.COMMAND + LANES + i], t[f.COMMAND + 2 * LANES + i]
-    _propagate(t, i, f.ESTIMATE, model, ax, ay, az)
-    P = estimation.time_update_4(_load_10(t, f.P_IN_PLANE + i), model.Phi_in_plane, belief.Q_in_plane)
-    P = estimation.thrust_noise_update_4(P, model.Gamma_in_plane, ax, ay, belief.thrust[0])
-    _store_10(t, f.P_IN_PLANE + i, P)
-    p = f.P_CROSS_TRACK + i
-    C = estimation.time_update_2((t[p], t[p + LANES], t[p + 2 * LANES]), model.Phi_cross_track, belief.Q_cross_track)
-    C = estimation.thrust_noise_update_2(C, model.Gamma_cross_track, az, belief.thrust[0])
-    t[p], t[p + LANES], t[p + 2 * LANES] = C
-
-
-@lane
-def filter_measurement_update(t: Array, i: int, belief: Noises, c: Scalars) -> None:
-    """Measure the true state and take in what arrives (Ma 2009, eq. 4.71-4.73)."""
-    n, truth, x = FIRST_SENSOR_NOISE + i, f.TRUTH + i, f.ESTIMATE + i
-    received = (belief.measures[0] * t[f.MEASURED + i], belief.measures[1] * t[f.MEASURED + i])
-    plane = (
-        t[truth] + c.sigma_pos * t[n],
-        t[truth + LANES] + c.sigma_pos * t[n + LANES],
-        t[truth + 3 * LANES] + c.sigma_vel * t[n + 3 * LANES],
-        t[truth + 4 * LANES] + c.sigma_vel * t[n + 4 * LANES],
-    )
-    cross = (
-        t[truth + 2 * LANES] + c.sigma_pos * t[n + 2 * LANES],
-        t[truth + 5 * LANES] + c.sigma_vel * t[n + 5 * LANES],
-    )
-    (x0, x1, x3, x4), P, nis_plane = estimation.measurement_update_4(
-        (t[x], t[x + LANES], t[x + 3 * LANES], t[x + 4 * LANES]),
-        _load_10(t, f.P_IN_PLANE + i),
-        plane,
-        belief.variances,
-        received,
-    )
-    _store_10(t, f.P_IN_PLANE + i, P)
-    p = f.P_CROSS_TRACK + i
-    (x2, x5), (p0, p1, p2), nis_cross = estimation.measurement_update_2(
-        (t[x + 2 * LANES], t[x + 5 * LANES]),
-        (t[p], t[p + LANES], t[p + 2 * LANES]),
-        cross,
-        belief.variances,
-        received,
-    )
-    t[p], t[p + LANES], t[p + 2 * LANES] = p0, p1, p2
-    t[x], t[x + LANES], t[x + 2 * LANES] = x0, x1, x2
-    t[x + 3 * LANES], t[x + 4 * LANES], t[x + 5 * LANES] = x3, x4, x5
-    t[f.NIS + i] = nis_plane + nis_cross
-
-
-@lane
-def _load_10(t: Array, k: int) -> estimation.Symmetric4:
-    return (
-        t[k],
-        t[k + LANES],
-        t[k + 2 * LANES],
-        t[k + 3 * LANES],
-        t[k + 4 * LANES],
-        t[k + 5 * LANES],
-        t[k + 6 * LANES],
-        t[k + 7 * LANES],
-        t[k + 8 * LANES],
-        t[k + 9 * LANES],
-    )
-
-
-@lane
-def _store_10(t: Array, k: int, P: estimation.Symmetric4) -> None:
-    t[k], t[k + LANES], t[k + 2 * LANES], t[k + 3 * LANES], t[k + 4 * LANES] = P[0], P[1], P[2], P[3], P[4]
-    t[k + 5 * LANES], t[k + 6 * LANES], t[k + 7 * LANES], t[k + 8 * LANES], t[k + 9 * LANES] = (
-        P[5],
-        P[6],
-        P[7],
-        P[8],
-        P[9],
-    )
 
 
 @lane

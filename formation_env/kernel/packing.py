@@ -1,4 +1,4 @@
-"""A scenario's settings as one flat array of floats, which is all that the compiled step sees of it.
+"""A scenario as the compiled step sees it: one flat array of settings, and a table with what differs from step to step.
 
 `pack` writes the named tuples below one after the other; `unpack` reads them back inside the compiled step, as scalars.
 """
@@ -8,12 +8,19 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numba.np.unsafe import ndarray as numba_arrays
 
-from formation_env.dynamics import DiscreteModel
+from formation_env.dynamics import NONLINEAR, DiscreteModel
 from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, Array
+from formation_env.dynamics.nonlinear import leader_table, substeps
 from formation_env.estimation import process_noise_covariance, upper_triangle
 from formation_env.jit import lane
 from formation_env.scenario import Scenario
-from formation_env.schedule import observation_layout
+from formation_env.schedule import build_schedule, observation_layout
+
+# What the true motion is made of, and the filter's: compile-time constants.
+CONSTANT_MODEL: Final = 0
+VARYING_MODEL: Final = 1
+NONLINEAR_NEAR: Final = 2  # gravity and drag
+NONLINEAR_FAR: Final = 3  # Sun, Moon and radiation pressure, too
 
 
 class Model(NamedTuple):
@@ -27,14 +34,32 @@ class Model(NamedTuple):
     delta_cross_track: Any  # 2
 
 
-class Noises(NamedTuple):
-    """The noises that the filter believes in."""
+class ProcessNoise(NamedTuple):
+    """The process noise that the filter believes in: upper triangles of its covariances over a step."""
 
     Q_in_plane: Any  # 10
     Q_cross_track: Any  # 3
+
+
+class SensorNoise(NamedTuple):
+    """The sensor that the filter believes in."""
+
     variances: Any  # 2: of a measured position and velocity axis
-    thrust: Any  # 1: variance of the relative error of the thrust's magnitude
     measures: Any  # 2: 1 where the sensor measures positions, velocities
+
+
+class Forces(NamedTuple):
+    """What acts in the nonlinear truth."""
+
+    substeps: float
+    j2: float
+    density: float  # kg/m^3, at the base radius
+    base_radius: float
+    per_scale_height: float
+    drag_area: float  # per mass, m^2/kg
+    sun: float  # 1 if it pulls
+    moon: float
+    radiation_area: float  # per mass, m^2/kg
 
 
 class Scalars(NamedTuple):
@@ -45,6 +70,7 @@ class Scalars(NamedTuple):
     max_accel: float
     min_accel: float
     thrust_noise: float
+    believed_thrust_variance: float
     process_noise: float
     sigma_pos: float
     sigma_vel: float
@@ -69,36 +95,83 @@ class Scalars(NamedTuple):
 to_fixed_tuple: Any = numba_arrays.to_fixed_tuple
 
 MODEL_SIZE: Final = 36
-NOISES_SIZE: Final = 18
+PROCESS_SIZE: Final = 13
+BELIEF_SIZE: Final = MODEL_SIZE + PROCESS_SIZE
+SENSOR_SIZE: Final = 4
+FORCES_SIZE: Final = len(Forces._fields)
 SCALAR_SIZE: Final = len(Scalars._fields)
+_BELIEF: Final = MODEL_SIZE
+_SENSOR: Final = _BELIEF + BELIEF_SIZE
+_FORCES: Final = _SENSOR + SENSOR_SIZE
+_SCALARS: Final = _FORCES + FORCES_SIZE
+
+
+def truth_kind(scenario: Scenario) -> int:
+    """How the true motion comes about."""
+    if scenario.dynamics == NONLINEAR:
+        return NONLINEAR_FAR if scenario.perturbations.far_bodies else NONLINEAR_NEAR
+    return _linear_kind(scenario.true_model())
+
+
+def belief_kind(scenario: Scenario) -> int:
+    """Whether the filter's model is the same at all steps."""
+    return _linear_kind(scenario.filter_model())
+
+
+def _linear_kind(model: DiscreteModel) -> int:
+    return VARYING_MODEL if model.Phi.ndim == 3 else CONSTANT_MODEL
 
 
 def pack(scenario: Scenario) -> Array:
-    """Settings (2 * MODEL_SIZE + NOISES_SIZE + SCALAR_SIZE,).
+    """Settings (_SCALARS + SCALAR_SIZE,). Models that vary are left 0 here; `step_table` has them.
 
     Raises:
         ValueError: a dynamics model couples the orbit plane and the cross-track axis.
     """
-    groups = (_model(scenario.true_model()), _model(scenario.filter_model()), _belief(scenario), _scalars(scenario))
-    return np.concatenate([np.ravel(values) for group in groups for values in group])
+    settings = np.zeros(_SCALARS + SCALAR_SIZE)
+    if truth_kind(scenario) == CONSTANT_MODEL:
+        settings[:_BELIEF] = _model(scenario.true_model())
+    if belief_kind(scenario) == CONSTANT_MODEL:
+        settings[_BELIEF:_SENSOR] = _belief(scenario)
+    settings[_SENSOR:_FORCES] = np.ravel(_sensor(scenario))
+    settings[_FORCES:_SCALARS] = _forces(scenario)
+    settings[_SCALARS:] = _scalars(scenario)
+    return settings
+
+
+def step_table(scenario: Scenario) -> Array:
+    """The plan with what varies behind it, (num_steps + 1, columns); row k has what acts on the step to instant k.
+
+    The columns are those of `schedule`; then the filter's `Model` and `ProcessNoise`, if they vary; then the true
+    `Model`, if that varies, or the leader's path, if the truth is nonlinear.
+    """
+    columns = []
+    if belief_kind(scenario) == VARYING_MODEL:
+        columns.append(_belief(scenario))
+    if truth_kind(scenario) == VARYING_MODEL:
+        columns.append(_model(scenario.true_model()))
+    elif truth_kind(scenario) != CONSTANT_MODEL:
+        columns.append(leader_table(scenario.world, scenario.leader, scenario.dt_s, scenario.num_steps))
+    plan = build_schedule(scenario)
+    return np.hstack([plan, *(np.vstack([part[:1], part]) for part in columns)])
 
 
 @lane
-def unpack(s: Array) -> tuple[Model, Model, Noises, Scalars]:
+def unpack(s: Array) -> tuple[Model, Model, ProcessNoise, SensorNoise, Forces, Scalars]:
     """The settings as tuples of scalars, so that the compiler need not read memory to know them."""
-    belief = Noises(
-        to_fixed_tuple(s[72:82], 10),
-        to_fixed_tuple(s[82:85], 3),
-        to_fixed_tuple(s[85:87], 2),
-        to_fixed_tuple(s[87:88], 1),
-        to_fixed_tuple(s[88:90], 2),
+    sensor = SensorNoise(
+        to_fixed_tuple(s[_SENSOR : _SENSOR + 2], 2),
+        to_fixed_tuple(s[_SENSOR + 2 : _FORCES], 2),
     )
-    scalars = Scalars(*to_fixed_tuple(s[90:], SCALAR_SIZE))
-    return _unpack_model(s[:36]), _unpack_model(s[36:72]), belief, scalars
+    forces = Forces(*to_fixed_tuple(s[_FORCES:_SCALARS], FORCES_SIZE))
+    scalars = Scalars(*to_fixed_tuple(s[_SCALARS:], SCALAR_SIZE))
+    process = unpack_process(s[_BELIEF + MODEL_SIZE : _SENSOR])
+    return unpack_model(s[:_BELIEF]), unpack_model(s[_BELIEF : _BELIEF + MODEL_SIZE]), process, sensor, forces, scalars
 
 
 @lane
-def _unpack_model(s: Array) -> Model:
+def unpack_model(s: Array) -> Model:
+    """A model from its numbers (MODEL_SIZE,)."""
     return Model(
         to_fixed_tuple(s[0:16], 16),
         to_fixed_tuple(s[16:24], 8),
@@ -109,29 +182,65 @@ def _unpack_model(s: Array) -> Model:
     )
 
 
-def _model(model: DiscreteModel) -> Model:
-    coupling = [model.Phi[np.ix_(a, b)] for a, b in ((IN_PLANE, CROSS_TRACK), (CROSS_TRACK, IN_PLANE))]
+@lane
+def unpack_process(s: Array) -> ProcessNoise:
+    """Process noise from its numbers (PROCESS_SIZE,)."""
+    return ProcessNoise(to_fixed_tuple(s[0:10], 10), to_fixed_tuple(s[10:13], 3))
+
+
+def _block(matrices: Array, rows: Array, columns: Array) -> Array:
+    """Rows and columns of matrices (..., 6, m), as numbers (..., count)."""
+    block = matrices[..., rows[:, None], columns]
+    return block.reshape(*block.shape[:-2], -1)
+
+
+def _model(model: DiscreteModel) -> Array:
+    """Numbers (..., MODEL_SIZE) of a discrete model."""
+    coupling = [_block(model.Phi, a, b) for a, b in ((IN_PLANE, CROSS_TRACK), (CROSS_TRACK, IN_PLANE))]
     if any(np.any(block != 0) for block in coupling):
         raise ValueError("the dynamics model couples the orbit plane and the cross-track axis")
-    return Model(
-        Phi_in_plane=model.Phi[np.ix_(IN_PLANE, IN_PLANE)],
-        Gamma_in_plane=model.Gamma[IN_PLANE, :2],
-        delta_in_plane=model.delta[IN_PLANE],
-        Phi_cross_track=model.Phi[np.ix_(CROSS_TRACK, CROSS_TRACK)],
-        Gamma_cross_track=model.Gamma[CROSS_TRACK, 2],
-        delta_cross_track=model.delta[CROSS_TRACK],
+    parts = Model(
+        Phi_in_plane=_block(model.Phi, IN_PLANE, IN_PLANE),
+        Gamma_in_plane=_block(model.Gamma, IN_PLANE, np.array([0, 1])),
+        delta_in_plane=model.delta[..., IN_PLANE],
+        Phi_cross_track=_block(model.Phi, CROSS_TRACK, CROSS_TRACK),
+        Gamma_cross_track=_block(model.Gamma, CROSS_TRACK, np.array([2])),
+        delta_cross_track=model.delta[..., CROSS_TRACK],
+    )
+    return np.concatenate(parts, axis=-1)
+
+
+def _belief(scenario: Scenario) -> Array:
+    """Numbers (..., BELIEF_SIZE) of the filter's model and process noise."""
+    model = scenario.filter_model()
+    Q_noise = process_noise_covariance(model.Gamma, scenario.belief.process_noise_m_s2)
+    noise = ProcessNoise(
+        Q_in_plane=upper_triangle(Q_noise[..., IN_PLANE[:, None], IN_PLANE]),
+        Q_cross_track=upper_triangle(Q_noise[..., CROSS_TRACK[:, None], CROSS_TRACK]),
+    )
+    return np.concatenate([_model(model), *noise], axis=-1)
+
+
+def _sensor(scenario: Scenario) -> SensorNoise:
+    believed = scenario.belief
+    return SensorNoise(
+        variances=(believed.sigma_pos_m**2, believed.sigma_vel_m_s**2),
+        measures=(1.0, float(scenario.sensor.measures == "position_and_velocity")),
     )
 
 
-def _belief(scenario: Scenario) -> Noises:
-    believed = scenario.belief
-    Q_noise = process_noise_covariance(scenario.filter_model().Gamma, believed.process_noise_m_s2)
-    return Noises(
-        Q_in_plane=upper_triangle(Q_noise[np.ix_(IN_PLANE, IN_PLANE)]),
-        Q_cross_track=upper_triangle(Q_noise[np.ix_(CROSS_TRACK, CROSS_TRACK)]),
-        variances=(believed.sigma_pos_m**2, believed.sigma_vel_m_s**2),
-        thrust=(believed.thrust_noise**2,),
-        measures=(1.0, float(scenario.sensor.measures == "position_and_velocity")),
+def _forces(scenario: Scenario) -> Forces:
+    on, craft = scenario.perturbations, scenario.spacecraft
+    return Forces(
+        substeps=substeps(scenario.dt_s),
+        j2=scenario.orbit.j2_coefficient,
+        density=craft.air_density_kg_m3,
+        base_radius=scenario.orbit.semi_major_axis_m,
+        per_scale_height=1 / on.scale_height_m if on.scale_height_m else 0.0,
+        drag_area=craft.drag_area_per_mass_m2_kg * on.drag,
+        sun=float(on.sun),
+        moon=float(on.moon),
+        radiation_area=craft.radiation_area_per_mass_m2_kg * on.radiation_pressure,
     )
 
 
@@ -145,6 +254,7 @@ def _scalars(scenario: Scenario) -> Scalars:
         max_accel=scenario.spacecraft.max_accel_m_s2,
         min_accel=scenario.spacecraft.min_accel_m_s2,
         thrust_noise=scenario.spacecraft.thrust_noise,
+        believed_thrust_variance=believed.thrust_noise**2,
         process_noise=scenario.process_noise_m_s2,
         sigma_pos=scenario.sensor.sigma_pos_m,
         sigma_vel=scenario.sensor.sigma_vel_m_s,

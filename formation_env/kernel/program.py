@@ -1,8 +1,9 @@
 """The compiled step and reset over all tiles."""
 
 import hashlib
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -10,8 +11,9 @@ from numpy.typing import NDArray
 
 from formation_env.dynamics.base import Array
 from formation_env.jit import FAST_MATH, LANES, stage
-from formation_env.kernel import lanes, packing
+from formation_env.kernel import filter, lanes, packing, truth
 from formation_env.kernel import tile as f
+from formation_env.kernel.linear import read_model, read_process
 from formation_env.observation import SIZE
 from formation_env.schedule import WIDTH
 
@@ -37,27 +39,33 @@ def _draw(t: Array, lane_set: LaneSet, first_block: int) -> None:
 
 
 @stage
-def _move(t: Array, lane_set: LaneSet, truth: packing.Model, c: packing.Scalars) -> None:
+def _thrust(t: Array, lane_set: LaneSet, c: packing.Scalars) -> None:
     for i in range(len(lane_set)):
         lanes.thruster(t, i, c)
-    for i in range(len(lane_set)):
-        lanes.truth_dynamics(t, i, truth, c)
     for i in range(len(lane_set)):
         lanes.link(t, i, c)
 
 
 @stage
-def _predict(t: Array, lane_set: LaneSet, believed: packing.Model, belief: packing.Noises) -> None:
+def _predict(
+    t: Array, lane_set: LaneSet, model: packing.Model, noise: packing.ProcessNoise, c: packing.Scalars
+) -> None:
     for i in range(len(lane_set)):
-        lanes.filter_time_update(t, i, believed, belief)
+        filter.filter_time_update(t, i, model, noise, c)
 
 
 @stage
-def _measure(t: Array, lane_set: LaneSet, belief: packing.Noises, c: packing.Scalars) -> None:
+def _predict_varying(t: Array, lane_set: LaneSet, c: packing.Scalars) -> None:
+    for i in range(len(lane_set)):
+        filter.filter_time_update(t, i, read_model(t, i, f.TABLE), read_process(t, i, f.TABLE), c)
+
+
+@stage
+def _measure(t: Array, lane_set: LaneSet, sensor: packing.SensorNoise, c: packing.Scalars) -> None:
     for i in range(len(lane_set)):
         lanes.dropout(t, i, c)
     for i in range(len(lane_set)):
-        lanes.filter_measurement_update(t, i, belief, c)
+        filter.filter_measurement_update(t, i, sensor, c)
 
 
 @stage
@@ -106,25 +114,38 @@ def _read_plan(t: Array, lane_set: LaneSet, used: int, schedule: Array, known_st
         same &= t[f.STEP + i] == t[f.STEP]
     if same and first == known_step:
         return first
-    if same:
-        for k in range(WIDTH):
+    for k in range(schedule.shape[1]):
+        field = f.PLAN + k * LANES if k < WIDTH else f.TABLE + (k - WIDTH) * LANES
+        if same:
             value = schedule[first, k]
             for i in range(len(lane_set)):
-                t[f.PLAN + k * LANES + i] = value
-        return first
-    for i in range(len(lane_set)):
-        step = min(int(t[f.STEP + i]), last)
-        for k in range(WIDTH):
-            t[f.PLAN + k * LANES + i] = schedule[step, k]
-    return -1
+                t[field + i] = value
+        else:
+            for i in range(len(lane_set)):
+                t[field + i] = schedule[min(int(t[f.STEP + i]), last), k]
+    return first if same else -1
 
 
-def _compile(source_hash: int) -> tuple[Any, Any]:
+class Program(NamedTuple):
+    """The compiled functions for a kind of true motion and of the filter's model."""
+
+    step: Any
+    reset: Any
+
+
+@cache
+def program(truth_kind: int, belief_kind: int) -> Program:
+    """The compiled step and reset for kinds of true motion and of the filter's model (see `packing`)."""
+    return _compile(_source_hash(), truth_kind, belief_kind)
+
+
+def _compile(source_hash: int, truth_kind: int, belief_kind: int) -> Program:
     """Compile step and reset.
 
     numba's cache looks only at the file of the outermost function; the hash, which is part of the cache's key, makes it
     see the others too.
     """
+    table = f.TABLE + (packing.BELIEF_SIZE * LANES if belief_kind == packing.VARYING_MODEL else 0)
     compiled = numba.njit(cache=True, fastmath=FAST_MATH, error_model="numpy")
 
     @compiled
@@ -143,14 +164,14 @@ def _compile(source_hash: int) -> tuple[Any, Any]:
         Args:
             states: the rows' states (tiles, STATE_FIELDS * LANES), updated.
             t: scratch space for one tile (TILE_FIELDS * LANES,).
-            schedule: the plan (num_steps + 1, WIDTH).
+            schedule: the plan and what varies behind it, `packing.step_table`.
             settings: packed settings.
             actions: (rows, 3).
             observations: (rows, SIZE), written.
             results: (NUM_RESULTS, tiles * LANES), written.
             lane_set: as long as the rows used of each tile.
         """
-        truth, believed, belief, c = packing.unpack(settings)
+        true_model, model, process, sensor, forces, c = packing.unpack(settings)
         rows = len(actions)
         known_step = -1
         for tile in range(len(states)):
@@ -165,9 +186,18 @@ def _compile(source_hash: int) -> tuple[Any, Any]:
                 t[f.STEP + i] += 1.0
             known_step = _read_plan(t, lane_set, used, schedule, known_step)
             _draw(t, lane_set, 0)
-            _move(t, lane_set, truth, c)
-            _predict(t, lane_set, believed, belief)
-            _measure(t, lane_set, belief, c)
+            _thrust(t, lane_set, c)
+            if truth_kind == packing.CONSTANT_MODEL:
+                truth.fly_linear(t, lane_set, true_model, c)
+            elif truth_kind == packing.VARYING_MODEL:
+                truth.fly_varying(t, lane_set, table, c)
+            else:
+                truth.fly_nonlinear(t, lane_set, table, truth_kind == packing.NONLINEAR_FAR, forces, c)
+            if belief_kind == packing.CONSTANT_MODEL:
+                _predict(t, lane_set, model, process, c)
+            else:
+                _predict_varying(t, lane_set, c)
+            _measure(t, lane_set, sensor, c)
             _judge(t, lane_set, c)
             _observe(t, lane_set, c)
             for k in range(_STATE_SIZE):
@@ -207,7 +237,7 @@ def _compile(source_hash: int) -> tuple[Any, Any]:
             results: written in these rows.
             lane_set: as in `step`.
         """
-        _, _, belief, c = packing.unpack(settings)
+        _, _, _, sensor, _, c = packing.unpack(settings)
         for first in range(0, len(rows), len(lane_set)):
             for i in range(len(lane_set)):
                 source = min(first + i, len(rows) - 1)  # idle lanes repeat the last row
@@ -222,7 +252,7 @@ def _compile(source_hash: int) -> tuple[Any, Any]:
             _draw(t, lane_set, _RESET_BLOCK)
             _begin(t, lane_set, given, c)
             _draw(t, lane_set, 0)
-            _measure(t, lane_set, belief, c)
+            _measure(t, lane_set, sensor, c)
             _judge(t, lane_set, c)
             _observe(t, lane_set, c)
             for i in range(min(len(lane_set), len(rows) - first)):
@@ -235,11 +265,21 @@ def _compile(source_hash: int) -> tuple[Any, Any]:
                     results[k, row] = t[f.RESULTS + k * LANES + i]
         return source_hash
 
-    return step, reset
+    return Program(step, reset)
 
 
 # Files whose functions or constants are compiled into the program, beside those of this folder.
-COMPILED_MODULES = ("jit", "fastmath", "streams", "estimation", "observation", "schedule")
+COMPILED_MODULES = (
+    "jit",
+    "constants",
+    "fastmath",
+    "forces",
+    "streams",
+    "estimation",
+    "observation",
+    "schedule",
+    "dynamics/nonlinear",
+)
 
 
 def _source_hash() -> int:
@@ -248,6 +288,3 @@ def _source_hash() -> int:
     paths = sorted([*package.glob("kernel/*.py"), *(package / f"{name}.py" for name in COMPILED_MODULES)])
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in paths))
     return int.from_bytes(digest.digest()[:7])
-
-
-step, reset = _compile(_source_hash())

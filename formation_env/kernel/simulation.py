@@ -6,10 +6,11 @@ from numpy.typing import NDArray
 from formation_env import observation
 from formation_env.dynamics.base import Array
 from formation_env.jit import LANES
-from formation_env.kernel import packing, program
+from formation_env.kernel import packing
 from formation_env.kernel import tile as f
+from formation_env.kernel.program import program
 from formation_env.scenario import Scenario
-from formation_env.schedule import OFFSETS, build_schedule
+from formation_env.schedule import OFFSETS, WIDTH
 from formation_env.streams import stream_key
 
 Rows = slice | NDArray[np.intp]
@@ -31,12 +32,13 @@ class Simulation:
         tiles = -(-num_rows // LANES)
         self.scenario = scenario
         self.num_rows = num_rows
-        self.schedule = build_schedule(scenario)
+        self.schedule = packing.step_table(scenario)
         self.actions = np.zeros((num_rows, 3), np.float32)
         self.results = np.zeros((f.NUM_RESULTS, tiles * LANES))
         self._settings = packing.pack(scenario)
         self._states = np.zeros((tiles, f.STATE_FIELDS * LANES))
-        self._scratch = np.zeros(f.TILE_FIELDS * LANES)
+        self._scratch = np.zeros((f.TILE_FIELDS + self.schedule.shape[1] - WIDTH) * LANES)
+        self._kinds = (packing.truth_kind(scenario), packing.belief_kind(scenario))
         self._lane_set = (False,) * (1 if num_rows == 1 else LANES)
         self._nominal_start = scenario.start.formation.state(scenario.orbit)
 
@@ -55,7 +57,7 @@ class Simulation:
             starts: LVLH states (k, 6) to start at, in place of the scenario's start and its spread.
         """
         places = np.tile(self._nominal_start, (len(rows), 1)) if starts is None else np.ascontiguousarray(starts)
-        program.reset(
+        program(*self._kinds).reset(
             self._states,
             self._scratch,
             self.schedule,
@@ -74,7 +76,7 @@ class Simulation:
         Args:
             observations: (num_rows, SIZE), written.
         """
-        program.step(
+        program(*self._kinds).step(
             self._states,
             self._scratch,
             self.schedule,

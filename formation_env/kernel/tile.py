@@ -64,6 +64,12 @@ MEASURED: Final = _field()
 PHASE: Final = _field()
 NUM_RESULTS: Final = _next_field - RESULTS // LANES
 OBSERVATION: Final = _field(observation.SIZE)
+# For the true motion.
+PUSH: Final = _field(3)  # thrust and random acceleration along LVLH, m/s^2
+RELATIVE: Final = _field(6)  # position and velocity relative to the leader along inertial axes
+BEFORE: Final = _field(6)  # the same at the substep's start
+RATES: Final = _field(42)  # of each stage
+TABLE: Final = _next_field * LANES  # what else the plan's row has, see `packing.step_table`; as long as need be
 TILE_FIELDS: Final = _next_field
 
 
