@@ -156,8 +156,8 @@ def test_initialization_is_the_printed_one(periods: float, error_m: float, accel
 def test_keeping_is_the_printed_one() -> None:
     """Figure 5.7 at 1 s: 300 m, below 4e-3 m/s^2, most of it across the plane; 2 % for reading off a figure.
 
-    In closed form: k^2 - n^2 times 3464 m is 2.94e-3 m/s^2, which LQR's stiffness n / sqrt(a) answers by about 300 m. The
-    rest of the effort undoes the unknown start.
+    In closed form: k^2 - n^2 times 3464 m is 2.94e-3 m/s^2, which LQR's stiffness n / sqrt(a) answers by about 300 m.
+    The rest of the effort undoes the unknown start.
     """
     job = plan.keepings((0,), periods=1.0)["keeping"]
     flights = replace(job, laws=(plan.LQR,)).fly(lambda cost: None)
