@@ -67,7 +67,7 @@ def _both_legends(figure: Figure, vectors: Axes, magnitudes: Axes) -> None:
     handles, labels = vectors.get_legend_handles_labels()
     more, names = magnitudes.get_legend_handles_labels()
     handles, labels = [*handles, *reversed(more)], [*labels, *reversed(names)]
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)))
+    figure.legend(handles, labels, loc="outside upper center", ncols=min(5, len(labels)))
 
 
 def flown(flights: Flights) -> slice:
