@@ -77,7 +77,7 @@ def test_quasi_static_feedforward_is_the_limit_of_the_tracking_equation(weights:
     scenario = dataclasses.replace(load_scenario("keeping"), dynamics="hcw")
     A, B = HCW().state_matrix(scenario.orbit, scenario.spacecraft), control_matrix()
     Q, R = weights.Q(), weights.R(scenario.orbit)
-    K, K_desired = tracking_gains(scenario, weights)
+    K, K_desired = (gains[0] for gains in tracking_gains(scenario, weights))
     desired = np.array([100.0, 200.0, -300.0, 0.1, -0.2, 0.3])
     loop = (A - B @ K).T
     slowest_s = -1 / np.linalg.eigvals(loop).real.max()
