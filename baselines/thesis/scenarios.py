@@ -98,19 +98,21 @@ def with_velocity(scenario: Scenario, velocity_m_s: Sequence[float]) -> Array:
     return np.concatenate([place[:3], velocity_m_s])
 
 
-def mission(dt_s: float | None = None) -> Scenario:
+def mission(dt_s: float | None = None, entry: ProjectedCircle = ENTRY) -> Scenario:
     """Section 5.2.5: from the leader to the x-y ellipse, then to the projected circle, with noise and filter.
 
     Each desired path is the formation's own from the start of its phase on, as in section 5.2.4.
+
+    Args:
+        dt_s: time step, s; the shipped scenario's if left out.
+        entry: the projected circle; its state is where the desired path goes on.
     """
     scenario = _shipped("thesis_mission", dt_s)
-    return replace(
-        scenario,
-        phases=tuple(
-            replace(phase, transfer_periods=0.0, hold_periods=phase.transfer_periods + phase.hold_periods)
-            for phase in scenario.phases
-        ),
+    ellipse, circle = (
+        replace(phase, transfer_periods=0.0, hold_periods=phase.transfer_periods + phase.hold_periods)
+        for phase in scenario.phases
     )
+    return replace(scenario, phases=(ellipse, replace(circle, formation=entry)))
 
 
 def law(name: str, scenario: Scenario, shipped: str, control_s2: float | None = None) -> AccelerationPolicy:

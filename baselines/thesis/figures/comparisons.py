@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
-from matplotlib import colormaps
 
 from baselines.thesis.figures import style
-from baselines.thesis.flights import Flights
+from baselines.thesis.flights import Flights, whole_periods
 from formation_env.dynamics.base import Array
 
 PERIODS = "Time [period]"
@@ -39,7 +39,7 @@ class Course:
     @property
     def periods(self) -> list[int]:
         """Whole periods of the flight."""
-        return list(range(1, 1 + int(self.flights.time_s[-1] / self.flights.scenario.orbit.period_s + 1e-3)))
+        return whole_periods(self.flights.scenario)
 
     def so_far(self, quantity: str) -> Array:
         """One of `mean_error`, `max_error` and `delta_v` of `Flights`, up to each period (periods,)."""
@@ -47,20 +47,20 @@ class Course:
         return np.array(values)
 
 
-def against_transfer_time(flown: Mapping[float, Flights]) -> Figure:
+def against_transfer_time(flown: Mapping[float, Flights], color: str) -> Figure:
     """Greatest and mean error and control of one policy against the transfer time in periods."""
     figure = style.sheet(5.0)
-    errors, controls = figure.subplots(2, 1, sharex=True)
+    errors, controls = figure.subplots(2, 1)
     times = sorted(flown)
     greatest = [flown[time].max_error()[0, 0] for time in times]
     mean = [flown[time].mean_error()[0, 0] for time in times]
-    errors.plot(times, greatest, color=style.TRUE, marker="o", label="greatest value")
-    errors.plot(times, mean, color=style.MARK, marker="s", linestyle="--", label="mean value")
+    errors.plot(times, greatest, color=color, marker="o", label="max value")
+    errors.plot(times, mean, color=color, marker="s", linestyle="--", label="mean value")
     greatest = [flown[time].max_accel()[0, 0] for time in times]
     mean = [flown[time].delta_v()[0, 0] / flown[time].time_s[-1] for time in times]
-    controls.plot(times, greatest, color=style.TRUE, marker="o")
-    controls.plot(times, mean, color=style.MARK, marker="s", linestyle="--")
-    style.label(errors, "", "Position error [m]")
+    controls.plot(times, greatest, color=color, marker="o")
+    controls.plot(times, mean, color=color, marker="s", linestyle="--")
+    style.label(errors, "Transfer time [period]", "Position error [m]")
     style.label(controls, "Transfer time [period]", "Control acceleration [m/s²]")
     for axes in (errors, controls):
         axes.axvspan(0.2, 0.8, color=style.DESIRED, alpha=0.15, lw=0, label="0.2 to 0.8 periods")
@@ -69,19 +69,24 @@ def against_transfer_time(flown: Mapping[float, Flights]) -> Figure:
     return figure
 
 
-def trade(sweeps: Sequence[Flights], periods: Sequence[int]) -> Figure:
-    """Consumption against accuracy over keeping times, a point for each weight; means over the seeds."""
+def trade(sweep: Sequence[tuple[Flights, int]], periods: Sequence[int]) -> Figure:
+    """Consumption against accuracy over keeping times, means over the seeds.
+
+    Args:
+        sweep: a point for each: flights and index of the policy.
+        periods: keeping times.
+    """
     figure = style.sheet(4.6)
     axes = figure.subplots()
     shades: Colormap = colormaps["viridis"]
     for index, time in enumerate(periods):
         color, marker = shades(index / len(periods)), "osD^"[index % 4]
-        spent = np.concatenate([flights.delta_v(time).mean(axis=1) for flights in sweeps])
-        for quantity, dash, word in (("mean_error", "-", "mean"), ("max_error", ":", "greatest")):
-            error = np.concatenate([getattr(flights, quantity)(time).mean(axis=1) for flights in sweeps])
+        spent = np.array([flights.delta_v(time)[policy].mean() for flights, policy in sweep])
+        for quantity, dash, word in (("mean_error", "-", "mean"), ("max_error", ":", "max")):
+            error = np.array([getattr(flights, quantity)(time)[policy].mean() for flights, policy in sweep])
             order = np.argsort(error)
             look: dict[str, Any] = {"color": color, "linestyle": dash, "marker": marker, "markersize": 4}
-            axes.plot(error[order], spent[order], **look, label=f"t = {time} p ({word} value)")
+            axes.plot(error[order], spent[order], **look, label=f"t = {time} p, {word}")
     style.label(axes, "Control accuracy [m]", CONSUMPTION)
     axes.set_ylim(bottom=0)
     axes.set_xlim(left=0)
@@ -92,15 +97,15 @@ def trade(sweeps: Sequence[Flights], periods: Sequence[int]) -> Figure:
 def over_time(courses: Sequence[Course]) -> Figure:
     """Greatest and mean error, and consumption, up to each period."""
     figure = style.sheet(5.4)
-    errors, spent = figure.subplots(2, 1, sharex=True)
+    errors, spent = figure.subplots(2, 1)
     for course in courses:
         look: dict[str, Any] = {"color": course.color, "marker": course.marker, "markersize": 4}
         errors.plot(course.periods, course.so_far("max_error"), linestyle=":", **look)
         errors.plot(course.periods, course.so_far("mean_error"), **look)
         spent.plot(course.periods, course.so_far("delta_v"), label=course.label, **look)
-    style.label(errors, "", "Position error [m]")
+    style.label(errors, PERIODS, "Position error [m]")
     style.label(spent, PERIODS, CONSUMPTION)
-    errors.set_title("dotted: greatest value, solid: mean value, up to that time", fontsize=9)
+    errors.set_title("dotted: max value, solid: mean value, up to that time", fontsize=9)
     for axes in (errors, spent):
         axes.set_ylim(bottom=0)
         whole_numbers(axes)
@@ -116,20 +121,21 @@ def whole_numbers(axes: Axes) -> None:
 
 def in_space(courses: Sequence[Course]) -> Figure:
     """Consumption against accuracy and time, in space as in the thesis, and seen from two sides."""
-    figure = style.sheet(4.8)
-    space: Any = figure.add_subplot(1, 2, 1, projection="3d")
-    errors, spent = figure.add_subplot(2, 2, 2), figure.add_subplot(2, 2, 4)
+    figure = style.sheet(8.0)
+    grid = figure.add_gridspec(2, 2, height_ratios=(1.7, 1.0))
+    space: Any = figure.add_subplot(grid[0, :], projection="3d")
+    errors, spent = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
     for course in courses:
         consumption = course.so_far("delta_v")
-        for quantity, dash, word in (("max_error", ":", "greatest"), ("mean_error", "-", "mean")):
+        for quantity, dash, word in (("max_error", ":", "max"), ("mean_error", "-", "mean")):
             look: dict[str, Any] = {"color": course.color, "marker": course.marker, "markersize": 4, "linestyle": dash}
             space.plot(course.periods, course.so_far(quantity), consumption, **look)
             errors.plot(course.periods, course.so_far(quantity), label=f"{course.label}, {word} value", **look)
         spent.plot(course.periods, consumption, color=course.color, marker=course.marker, markersize=4)
     style.label(space, PERIODS, "Control accuracy [m]").set_zlabel(CONSUMPTION)
-    style.label(errors, "", "Control accuracy [m]")
+    style.label(errors, PERIODS, "Control accuracy [m]")
     style.label(spent, PERIODS, CONSUMPTION)
-    space.set_box_aspect(None, zoom=0.85)
+    space.set_box_aspect((1.2, 1.2, 0.8), zoom=0.9)
     for axes in (errors, spent):
         axes.set_ylim(bottom=0)
         whole_numbers(axes)

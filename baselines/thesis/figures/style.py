@@ -17,9 +17,8 @@ AXES: Final = (("x", "#009E73", "-"), ("y", "#E69F00", "--"), ("z", "#333333", "
 COLORS: Final = {name: look.color for name, look in looks(("lqr", "lqr_tracking", "smc")).items()}
 """Of the policies, as in the report."""
 DESIRED: Final = NEUTRAL
-TRUE: Final = "#0072B2"
-MARK: Final = "#D55E00"
-LIMIT: Final = "#CC79A7"
+PLANNED: Final = "#333333"
+START: Final = "#E69F00"
 _SETTINGS: Final = {
     "svg.hashsalt": "formation-env",  # equal figures are equal files
     "font.size": 9.0,
@@ -51,18 +50,22 @@ def label(axes: Axes, x: str, y: str) -> Axes:
 
 
 def legend(figure: Figure, axes: Axes, columns: int = 4) -> None:
-    """One legend below all axes, where it hides nothing."""
+    """One legend above all axes, where it hides nothing."""
     handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=min(columns, len(labels)))
+    figure.legend(handles, labels, loc="outside upper center", ncols=min(columns, len(labels)))
 
 
-def image(figure: Figure, kind: str) -> bytes:
-    """The figure as a file of that kind, `png` or `svg`."""
-    stream = BytesIO()
-    figure.savefig(stream, format=kind, dpi=DPI, metadata=_NO_DATE[kind])
-    return stream.getvalue()
+def images(figure: Figure) -> dict[str, bytes]:
+    """The figure as files, by kind: `svg` and `png`. It is laid out once, for that takes longest."""
+    result = {}
+    for kind, metadata in _NO_DATE.items():
+        stream = BytesIO()
+        figure.savefig(stream, format=kind, dpi=DPI, metadata=metadata)
+        figure.set_layout_engine("none")
+        result[kind] = stream.getvalue()
+    return result
 
 
 def few_ticks() -> MaxNLocator:
     """For a small axis in space."""
-    return MaxNLocator(4)
+    return MaxNLocator(4, min_n_ticks=3)
