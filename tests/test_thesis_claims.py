@@ -10,11 +10,8 @@ from baselines.thesis import claims, claims_grid, jobs, plan, scenarios
 from baselines.thesis.claims_conclusions import least_fuel_m_s
 from baselines.thesis.claims_fair import LAWS, candidates
 from baselines.thesis.claims_flights import Effort, Noise
-from baselines.thesis.claims_initialization import two_impulses_m_s
 from baselines.thesis.claims_readings import READINGS
 from baselines.thesis.claims_verdict import Between, Statement
-from formation_env.dynamics.hcw import transition_matrix
-from formation_env.orbit import Orbit
 from formation_env.scenario import load_scenario
 
 TINY = Effort(seeds=2, dt_s=60.0, periods=2, coarse_dt_s=60.0, grid_dt_s=60.0, truths=("modified_hcw",), candidates=2)
@@ -99,14 +96,6 @@ def test_the_misprinted_frequency_gives_the_thesis_s_300_m() -> None:
     assert 290 < amplitude_m < 300
     assert flights.max_error()[0, 0] == pytest.approx(amplitude_m, rel=5e-3)
     assert 2e-3 < flights.max_accel()[0, 0] < 4e-3
-
-
-def test_two_impulses_raise_an_orbit_as_hohmann_does() -> None:
-    """Raising a circular orbit by x takes n x / 4 at each end of half a period: limit of Ma 2009, eq. (3.10-3.11)."""
-    orbit, x_m = Orbit(), 100.0
-    n = orbit.mean_motion_rad_s
-    end = np.array([x_m, -0.75 * math.pi * x_m, 0, 0, -1.5 * n * x_m, 0])
-    assert two_impulses_m_s(transition_matrix(n, orbit.period_s / 2), np.zeros(6), end) == pytest.approx(n * x_m / 2)
 
 
 def test_the_plan_of_few_burns_is_no_dearer_than_hohmann() -> None:

@@ -9,7 +9,8 @@ from baselines.thesis.claim import Claim
 from baselines.thesis.claims_flights import Effort
 from baselines.thesis.claims_verdict import Between, Statement
 from baselines.thesis.flights import Flights
-from formation_env.dynamics.base import Array
+from baselines.transfers import two_impulse
+from formation_env.dynamics.base import DiscreteModel
 from formation_env.dynamics.hcw import transition_matrix
 
 HALF, TENTH = 0.5, 0.1
@@ -132,20 +133,7 @@ def _hohmann(half: Flights, assumption: str) -> Claim:
         "A Hohmann transfer coasts between its impulses; on the line the follower thrusts against the Coriolis "
         "force all the way, and in the inertial frame it only looks like an ellipse of the same duration.",
     )
-    end = half.desired[-1]
-    Phi = transition_matrix(half.scenario.orbit.mean_motion_rad_s, half.time_s[-2])
-    return statement.judge(half.delta_v()[0] / two_impulses_m_s(Phi, np.zeros(6), end))
-
-
-def two_impulses_m_s(Phi: Array, start: Array, end: Array) -> float:
-    """Delta-v of the two impulses that lead from one relative state to another, m/s.
-
-    Args:
-        Phi: transition matrix (6, 6) over the transfer.
-        start: state (6,), m and m/s.
-        end: state (6,).
-    """
-    # r_f = Phi_rr r_0 + Phi_rv (v_0 + dv_1)
-    departure = np.linalg.lstsq(Phi[:3, 3:], end[:3] - Phi[:3] @ start)[0]  # half an orbit moves nothing across
-    arrival = end[3:] - Phi[3:] @ start - Phi[3:, 3:] @ departure
-    return float(np.linalg.norm(departure) + np.linalg.norm(arrival))
+    time_s, n = float(half.time_s[-2]), half.scenario.orbit.mean_motion_rad_s
+    coast = DiscreteModel(transition_matrix(n, time_s), np.zeros((6, 3)), np.zeros(6))
+    impulses = two_impulse(coast, time_s, n, np.zeros(6), half.desired[-1])
+    return statement.judge(half.delta_v()[0] / impulses.delta_v_m_s)

@@ -44,8 +44,19 @@ class Weighted(Law):
         return make_policy("lqr", scenario, replace(gains, hold=replace(gains.hold, control_s2=control_s2)))
 
 
+@dataclass(frozen=True)
+class Integrated(Law):
+    """The tracker with g integrated backwards along the path (eq. 4.19), which does not lag."""
+
+    def make(self, scenario: Scenario) -> AccelerationPolicy:
+        """The policy for a scenario."""
+        gains = super().make(scenario).gains  # type: ignore[attr-defined]
+        return make_policy("lqr_tracking", scenario, replace(gains, feedforward="integrated"))
+
+
 LQR, TRACKING, SMC = plan.LQR, plan.TRACKING, plan.SMC
 WITH_PATH: Final = WithPath(LQR.name, LQR.shipped)
+INTEGRATED: Final = Integrated(TRACKING.name, TRACKING.shipped)
 FIRST, ALL = (Weighted(LQR.name, LQR.shipped, axes=axes) for axes in ((0,), (0, 1, 2)))
 
 
@@ -84,6 +95,8 @@ READINGS: Final = (
     Reading("quasi-static tracker, k with its n", TRACKING),
     Reading("quasi-static tracker, k with its n, 60 s", TRACKING, dt_s=60.0),
     Reading("quasi-static tracker, k as printed", TRACKING, plan.DYNAMICS),
+    Reading("tracker with integrated g, k with its n", INTEGRATED),
+    Reading("tracker with integrated g, k as printed", INTEGRATED, plan.DYNAMICS),
     Reading("error-state law and the path's thrust, k as printed", WITH_PATH, plan.DYNAMICS),
     Reading("sliding mode, k as printed", SMC, plan.DYNAMICS),
 )
