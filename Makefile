@@ -24,7 +24,7 @@ report: $(REPORT) ## Classical baselines on the four environments (EPISODES=100 
 	$(PY) -m baselines report --episodes $(EPISODES) --out $(OUT)
 
 thesis: $(REPORT) ## The source thesis's figures and claims, reproduced (OUT=reports/): OUT/thesis/thesis.html
-	$(PY) -m baselines reproduce --out $(OUT)/thesis $(ARGS)
+	$(PY) -m baselines reproduce --out $(patsubst %/,%,$(OUT))/thesis $(ARGS)
 
 test: $(TEST) ## Run the tests (ARGS="-k kalman -n 0")
 	$(PY) -m pytest $(ARGS)
