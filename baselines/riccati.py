@@ -25,8 +25,13 @@ def stationary(Phi: Array, Gamma: Array, Q: Array, R: Array) -> tuple[Array, Arr
         Q: state weight (6, 6).
         R: control weight (3, 3).
     """
-    K, P, _ = control.dlqr(Phi, Gamma, Q, R)
-    return np.asarray(K), np.asarray(P)
+    # In units of the loop itself (c per s^2 of acceleration, c^(-1/2) s of time): in SI the solver fails at some steps.
+    c = np.sqrt(np.trace(Q[:3, :3]) / np.trace(R)) or 1.0
+    scale = np.repeat([1.0, np.sqrt(c)], 3)
+    K, P, _ = control.dlqr(
+        Phi * scale / scale[:, None], Gamma * c / scale[:, None], Q * np.outer(scale, scale), R * c**2
+    )
+    return np.asarray(c * K / scale), np.asarray(P / np.outer(scale, scale))
 
 
 def continuous_gain(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
