@@ -122,8 +122,8 @@ def _with(fail: Deck, effort: Effort) -> list[Claim]:
             "SMC's error half of LQR's",
             "SMC's mean error is {} times the LQR's",
             Between(0.4, 0.67),
-            "It holds over ten periods where the start is known to 10 m and 0.02 m/s (see the grid) and turns round where "
-            "it is known worse, since the sliding mode's slow surface takes hours to undo the drift.",
+            "It holds over ten periods where the start is known to 10 m and 0.02 m/s (see the grid) and turns round "
+            "where it is known worse, since the sliding mode's slow surface takes hours to undo the drift.",
         ).judge(error[smc] / error[lqr]),
         say(
             "more accuracy: 5 % of system scale",
