@@ -119,7 +119,7 @@ def test_a_claim_counts_its_sentence_over_the_noise_levels() -> None:
     """The row of the table says how often its own sentence holds in the grid, and no other sentence's verdicts."""
     claim = said(Between(high=1.0)).judge(np.array([0.5]))
     other = replace(claim, sentence="another sentence", verdict="fails")
-    judged = [(Noise(), claim), (Noise(), replace(claim, verdict="fails")), (Noise(), claim), (Noise(), other)]
+    judged = [(TINY, claim), (TINY, replace(claim, verdict="fails")), (TINY, claim), (TINY, other)]
     assert claims_grid.with_levels(claim, judged).assumption == (
         "an assumption. Over 3 noise levels: holds at 2, fails at 1"
     )
@@ -158,9 +158,9 @@ def test_the_verdicts_of_the_table_are_those_of_its_intervals(tiny: claims.Table
 
 
 def test_the_grid_has_each_sentence_at_each_level(tiny: claims.Tables) -> None:
-    """Every sentence of the grid is judged once at each of the two levels, and stands in the table too."""
+    """Every sentence of the grid is judged at both levels and at the long one, and stands in the table too."""
     counts = tiny.noise.groupby(["section", "sentence"]).size()
-    assert (counts == 2).all()
+    assert (counts == 3).all()
     table = {(claim.section, claim.sentence) for claim in tiny.claims}
     assert set(counts.index) <= table
 

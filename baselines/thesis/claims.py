@@ -1,8 +1,8 @@
 """The claims table: every number and comparison that chapters 5 and 6 state, and what became of it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 
 import pandas as pd
 
@@ -23,7 +23,7 @@ from baselines.thesis.claims_fair import Comparison
 from baselines.thesis.claims_flights import Effort, keeper_decks, keepers
 from baselines.thesis.jobs import Job
 
-_PARTS = {
+_PARTS: Final[dict[str, Callable[[Effort], Mapping[str, Job | Comparison]]]] = {
     "keepers": keepers,
     "sweep": lambda effort: {"sweep": claims_keeping.sweep(effort.coarse)},
     "maneuvers": claims_maneuver.jobs,

@@ -23,45 +23,48 @@ LEVELS: Final = tuple(
 )
 
 
+KNOWN: Final = Noise(spread_pos_m=10.0, spread_vel_m_s=0.02)
+"""Flown for as long as the headline, since the sliding mode takes hours to undo a drift."""
+
+
+def _levels(effort: Effort) -> list[Effort]:
+    """The effort at each level, with a longer step; the last is the long one."""
+    short = [replace(effort, dt_s=effort.grid_dt_s, periods=effort.grid_periods, noise=noise) for noise in LEVELS]
+    return [*short, replace(effort, dt_s=effort.grid_dt_s, noise=KNOWN)]
+
+
 def jobs(effort: Effort) -> dict[str, Job]:
-    """Short flights with a longer step at each level."""
+    """The flights of each level."""
     return {
-        f"{name} {index}": job
-        for index, noise in enumerate(LEVELS)
-        for name, job in keepers(_level(effort, noise)).items()
+        f"{name} {index}": job for index, level in enumerate(_levels(effort)) for name, job in keepers(level).items()
     }
 
 
-def _level(effort: Effort, noise: Noise) -> Effort:
-    return replace(effort, dt_s=effort.grid_dt_s, periods=effort.grid_periods, noise=noise)
-
-
-def judge(flown: Mapping[str, Flights], effort: Effort) -> list[tuple[Noise, Claim]]:
+def judge(flown: Mapping[str, Flights], effort: Effort) -> list[tuple[Effort, Claim]]:
     """The claims of sections 5.2.2 and 5.2.3 at each level."""
     judged = []
-    for index, noise in enumerate(LEVELS):
-        level = _level(effort, noise)
+    for index, level in enumerate(_levels(effort)):
         keep, fail = keeper_decks(flown[f"keep {index}"], flown[f"fail {index}"])
         claims = [
             *claims_keeping.at_one_noise(keep, level),
             *claims_failure.claims(keep, fail, level),
             *claims_smc.claims(keep, fail, level),
         ]
-        judged += [(noise, claim) for claim in claims if claim.low is not None]
+        judged += [(level, claim) for claim in claims if claim.low is not None]
     return judged
 
 
-def table(judged: list[tuple[Noise, Claim]]) -> pd.DataFrame:
+def table(judged: list[tuple[Effort, Claim]]) -> pd.DataFrame:
     """One line per level and claim."""
     lines: list[dict[str, Any]] = []
-    for noise, claim in judged:
+    for level, claim in judged:
         said = {"section": claim.section, "sentence": claim.sentence, "thesis_value": claim.thesis_value}
         found = {"ours": claim.ours, "low": claim.low, "high": claim.high, "verdict": claim.verdict}
-        lines.append({**asdict(noise), **said, **found})
+        lines.append({**asdict(level.noise), "periods": level.periods, **said, **found})
     return pd.DataFrame(lines)
 
 
-def with_levels(claim: Claim, judged: list[tuple[Noise, Claim]]) -> Claim:
+def with_levels(claim: Claim, judged: list[tuple[Effort, Claim]]) -> Claim:
     """A claim that also says how its sentence fares over the levels."""
     verdicts = Counter(c.verdict for _, c in judged if (c.section, c.sentence) == (claim.section, claim.sentence))
     if not verdicts:
