@@ -13,7 +13,7 @@ INPUTS := pyproject.toml constraints.txt
 INSTALL = $(PY) -m pip install --quiet -c constraints.txt -e
 
 .DEFAULT_GOAL := help
-.PHONY: help report test check bench clean
+.PHONY: help report thesis test check bench clean
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 
@@ -22,6 +22,9 @@ help: ## Show this list
 
 report: $(REPORT) ## Classical baselines on the four environments (EPISODES=100 OUT=reports/)
 	$(PY) -m baselines report --episodes $(EPISODES) --out $(OUT)
+
+thesis: $(REPORT) ## The source thesis's figures and claims, reproduced (OUT=reports/): OUT/thesis/thesis.html
+	$(PY) -m baselines reproduce --out $(OUT)/thesis $(ARGS)
 
 test: $(TEST) ## Run the tests (ARGS="-k kalman -n 0")
 	$(PY) -m pytest $(ARGS)

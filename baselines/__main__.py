@@ -2,13 +2,14 @@
 
 import typer
 
-from baselines.commands import report
+from baselines.commands import report, reproduce
 from baselines.picture import render
 from baselines.tuning import tune
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False)
 app.command()(tune)
 app.command()(report)
+app.command()(reproduce)
 app.command()(render)
 
 if __name__ == "__main__":

@@ -1,9 +1,10 @@
-"""The command `report`. Its libraries are imported only when it runs."""
+"""The commands `report` and `reproduce`. Their libraries are imported only when they run."""
 
+import os
 import shlex
 import signal
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -45,19 +46,54 @@ def run_report(
         SystemExit: 2 after a mistake in the options, 1 after another failure, 130 after an interrupt.
     """
     command = shlex.join(["python", "-m", package, *sys.argv[1:]])
-    before = signal.signal(signal.SIGTERM, _interrupt)
-    try:
+
+    def write() -> Path:
         from baselines.report import write_report
 
-        page = write_report(policies, envs, episodes, out, command)
+        return write_report(policies, envs, episodes, out, command)
+
+    _run("report", out, write)
+
+
+def reproduce(
+    episodes: Annotated[int, typer.Option(min=1, help="Test seeds of each flight with noise.")] = 50,
+    out: Out = Path("reports/thesis"),
+    step_s: Annotated[float | None, typer.Option(help="Time step, s; a coarse one for a quick look.")] = None,
+    processes: Annotated[int, typer.Option(min=1, help="To fly in.")] = min(2, os.cpu_count() or 1),
+) -> None:
+    """Redraw the thesis's figures, and write them and one HTML page of all."""
+    command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
+
+    def write() -> Path:
+        from baselines.thesis.report import write_thesis
+
+        return write_thesis(out, episodes, command, processes, step_s)
+
+    _run("reproduce", out, write)
+
+
+def _run(name: str, out: Path, write: Callable[[], Path]) -> None:
+    """Write a report, and end the program with one line if that fails.
+
+    Args:
+        name: of the command.
+        out: folder that it writes to.
+        write: does it, and gives the page's path.
+
+    Raises:
+        SystemExit: 2 after a mistake in the options, 1 after another failure, 130 after an interrupt.
+    """
+    before = signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        page = write()
     except KeyboardInterrupt:
-        _end("report: interrupted, nothing written", 130)
+        _end(f"{name}: interrupted, nothing written", 130)
     except ModuleNotFoundError as error:
-        _end(f"report: needs {str(error.name).split('.')[0]}; install it with: pip install 'formation-env[report]'", 1)
+        _end(f"{name}: needs {str(error.name).split('.')[0]}; install it with: pip install 'formation-env[report]'", 1)
     except ConfigError as error:
         _end(str(error), 2)
     except OSError as error:
-        _end(f"report: {out}: cannot be written: {error.strerror or error}", 1)
+        _end(f"{name}: {out}: cannot be written: {error.strerror or error}", 1)
     finally:
         signal.signal(signal.SIGTERM, before)
     typer.echo(f"wrote {page}")

@@ -17,8 +17,8 @@ import typer
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, differential_evolution
 
-from baselines.policy import Actions, Observations
 from baselines.registry import make_policy, read_gains
+from baselines.side_by_side import SideBySide
 from formation_env.dynamics.base import Array
 from formation_env.evaluation import Policy, evaluate
 from formation_env.files import write_texts
@@ -66,21 +66,6 @@ STAGES: Final[dict[str, tuple[tuple[Knob, ...], ...]]] = {
     ),
 }
 """Knobs of each policy, stage by stage. A stage of the transfer is left out where there is none."""
-
-
-class SideBySide:
-    """Policies that fly equal shares of a batch's rows, in order."""
-
-    def __init__(self, policies: Sequence[Policy]) -> None:
-        self.policies = policies
-
-    def predict(
-        self, observation: Observations, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> tuple[Actions, Any]:
-        """Actions (rows, 3) for observations (rows, SIZE)."""
-        shares = np.split(observation, len(self.policies))
-        actions = [policy.predict(share)[0] for policy, share in zip(self.policies, shares, strict=True)]
-        return np.concatenate(actions), state
 
 
 def costs(policies: Sequence[Policy], scenario: Scenario, episode_seeds: Sequence[int]) -> Array:

@@ -47,7 +47,20 @@ def write_texts(folder: Path, texts: Mapping[str, str]) -> None:
     Raises:
         OSError: the folder cannot be written.
     """
+    write_files(folder, {name: text.encode() for name, text in texts.items()})
+
+
+def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
+    """The same for files of any kind.
+
+    Args:
+        folder: made if it does not exist.
+        contents: file name -> content.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     with contextlib.ExitStack() as stack:
-        for name, text in texts.items():
-            stack.enter_context(replacing(folder / name)).write_text(text, encoding="utf-8", newline="\n")
+        for name, content in contents.items():
+            stack.enter_context(replacing(folder / name)).write_bytes(content)

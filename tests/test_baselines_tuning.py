@@ -8,7 +8,8 @@ from typer.testing import CliRunner
 
 from baselines.__main__ import app
 from baselines.registry import POLICIES, make_policy, read_gains
-from baselines.tuning import STAGES, SideBySide, costs, first_gains, read, replace_section, stages, turn
+from baselines.side_by_side import SideBySide
+from baselines.tuning import STAGES, costs, first_gains, read, replace_section, stages, turn
 from formation_env import load_scenario
 from formation_env.evaluation import evaluate
 from formation_env.settings import build

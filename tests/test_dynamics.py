@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import expm
 
-from formation_env.dynamics import DYNAMICS, HCW, ModifiedHCW, get_dynamics
+from formation_env.dynamics import DYNAMICS, HCW, ModifiedHCW, PrintedHCW, get_dynamics
 from formation_env.dynamics.hcw import transition_matrix
 from formation_env.orbit import Orbit
 from formation_env.propagation import propagate
@@ -183,6 +183,19 @@ def test_equal_drag_damps_every_oscillation() -> None:
     fast = eigenvalues[eigenvalues.imag > 0.5 * N]
     # D / n = 2e-4 is the size of what the first order leaves out.
     np.testing.assert_allclose(np.sort(fast.real), [-0.75 * drag, -0.25 * drag], rtol=1e-3)
+
+
+def test_printed_cross_track_frequency_is_the_misprint_to_the_letter() -> None:
+    """k = n sqrt(1 + s) + 3 J2 R_E^2 / (2 r1^2) cos^2 i (eq. 2.62): 1.4222e-3 rad/s.
+
+    By hand for 600 km, 60 deg: n = 1.08308e-3, sqrt(1 + s) = 0.999915, 3/2 * 1.08263e-3 * 0.914017^2 / 4 = 3.3917e-4;
+    four digits are kept.
+    """
+    orbit = Orbit()
+    printed, meant = (kind().state_matrix(orbit, NO_AIR) for kind in (PrintedHCW, ModifiedHCW))
+    assert math.sqrt(-printed[5, 2]) == pytest.approx(1.08308e-3 * 0.999915 + 3.3917e-4, rel=1e-4)
+    printed[5, 2] = meant[5, 2]
+    np.testing.assert_array_equal(printed, meant)
 
 
 def modified_hcw_rates(state: Array, thrust: Array) -> Array:

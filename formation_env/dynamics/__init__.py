@@ -5,6 +5,7 @@ from typing import Final
 from formation_env.dynamics.base import DiscreteModel, Dynamics
 from formation_env.dynamics.hcw import HCW
 from formation_env.dynamics.modified_hcw import ModifiedHCW
+from formation_env.dynamics.printed_hcw import PrintedHCW
 from formation_env.dynamics.yamanaka_ankersen import YamanakaAnkersen
 from formation_env.settings import nearest
 
@@ -12,6 +13,7 @@ DYNAMICS: dict[str, type[Dynamics]] = {
     "hcw": HCW,
     "modified_hcw": ModifiedHCW,
     "yamanaka_ankersen": YamanakaAnkersen,
+    "printed_hcw": PrintedHCW,
 }
 
 NONLINEAR: Final = "nonlinear"
@@ -36,6 +38,7 @@ __all__ = [
     "DiscreteModel",
     "Dynamics",
     "ModifiedHCW",
+    "PrintedHCW",
     "YamanakaAnkersen",
     "get_dynamics",
 ]

@@ -1,0 +1,54 @@
+"""The claims over the noise that the thesis is silent on: the same sentences at each level."""
+
+from collections import Counter
+from dataclasses import asdict, replace
+from itertools import product
+from typing import Any, Final
+
+import pandas as pd
+
+from baselines.thesis import claims_failure, claims_flights, claims_keeping, claims_smc
+from baselines.thesis.claim import Claim
+from baselines.thesis.claims_flights import Effort, Noise
+
+SENSORS_M: Final = (0.02, 2.0, 20.0)
+PROCESSES_M_S2: Final = (0.0, 5e-6, 5e-5)
+STARTS: Final = ((10.0, 0.02), (50.0, 0.05))
+"""1-sigma of the unknown start, m and m/s."""
+LEVELS: Final = tuple(
+    Noise(sensor, process, *start) for start, sensor, process in product(STARTS, SENSORS_M, PROCESSES_M_S2)
+)
+
+
+def grid(effort: Effort, levels: tuple[Noise, ...] = LEVELS) -> list[tuple[Noise, Claim]]:
+    """The claims of sections 5.2.2 and 5.2.3 at each level, from short flights with a longer step."""
+    judged = []
+    for noise in levels:
+        level = replace(effort, dt_s=effort.grid_dt_s, periods=effort.grid_periods, noise=noise)
+        keep, fail = claims_flights.keeping(level), claims_flights.failure(level)
+        claims = [
+            *claims_keeping.at_one_noise(keep, level),
+            *claims_failure.claims(keep, fail, level),
+            *claims_smc.claims(keep, fail, level),
+        ]
+        judged += [(noise, claim) for claim in claims if claim.low is not None]
+    return judged
+
+
+def table(judged: list[tuple[Noise, Claim]]) -> pd.DataFrame:
+    """One line per level and claim."""
+    lines: list[dict[str, Any]] = []
+    for noise, claim in judged:
+        said = {"section": claim.section, "sentence": claim.sentence, "thesis_value": claim.thesis_value}
+        found = {"ours": claim.ours, "low": claim.low, "high": claim.high, "verdict": claim.verdict}
+        lines.append({**asdict(noise), **said, **found})
+    return pd.DataFrame(lines)
+
+
+def with_levels(claim: Claim, judged: list[tuple[Noise, Claim]]) -> Claim:
+    """A claim that also says how its sentence fares over the levels."""
+    verdicts = Counter(c.verdict for _, c in judged if (c.section, c.sentence) == (claim.section, claim.sentence))
+    if not verdicts:
+        return claim
+    counts = ", ".join(f"{verdict} at {count}" for verdict, count in verdicts.most_common())
+    return replace(claim, assumption=f"{claim.assumption}. Over {verdicts.total()} noise levels: {counts}")

@@ -1,0 +1,101 @@
+"""What the figures of chapter 5 take from the flights of `baselines.thesis.plan`."""
+
+from collections.abc import Callable, Mapping
+
+from matplotlib.figure import Figure
+
+from baselines.thesis import plan
+from baselines.thesis.figures import comparisons, panels, paths, style
+from baselines.thesis.figures.comparisons import Course
+from baselines.thesis.figures.panels import Line
+from baselines.thesis.flights import Flights
+
+Flown = Mapping[str, Flights]
+Draw = Callable[[Flown], Figure]
+
+LQR, FINER, SMC = (plan.KEEPING.index(law) for law in (plan.LQR, plan.FINER, plan.SMC))
+FAILED_LQR, FAILED_SMC = (plan.FAILURE.index(law) for law in (plan.LQR, plan.SMC))
+MEANT_LQR, MEANT_TRACKING = (plan.MEANT.index(law) for law in (plan.LQR, plan.TRACKING))
+BLUE, RED, SKY = (style.COLORS[name] for name in ("lqr", "smc", "lqr_tracking"))
+
+
+def initialization(flown: Flown, periods: str) -> Figure:
+    """Four panels of a following initialization."""
+    return panels.four_panels([Line("tracking LQR", flown[f"initialization {periods}"], 0, SKY)])
+
+
+def keeping(flown: Flown) -> Figure:
+    """Four panels of LQR with k as printed and with its n."""
+    return panels.four_panels(
+        [
+            Line("LQR, k as printed", flown["keeping"], LQR, BLUE),
+            Line("LQR, k with its n", flown["meant"], MEANT_LQR, "black", "--"),
+        ]
+    )
+
+
+def one_flight(name: str, policy: int, label: str, color: str) -> Draw:
+    """Four panels of one policy of one job."""
+    return lambda flown: panels.four_panels([Line(label, flown[name], policy, color)])
+
+
+def one_path(name: str, policy: int, color: str) -> Draw:
+    """Trajectory of one policy of one job."""
+    return lambda flown: paths.flight_path(flown[name], policy, color)
+
+
+def lqr_weights(flown: Flown) -> list[tuple[Flights, int]]:
+    """Flights and index of each LQR weight flown on the space circle."""
+    sweeps = [(flown[name], policy) for name in ("sweep 1", "sweep 2") for policy in range(len(plan.SWEEP_S2) // 2)]
+    return [*sweeps, (flown["keeping"], LQR), (flown["keeping"], FINER)]
+
+
+def weights(flown: Flown) -> Figure:
+    """Consumption against accuracy of all LQR weights."""
+    keeping = flown["keeping"]
+    end = keeping.time_s[-1] / keeping.scenario.orbit.period_s + 1e-3
+    return comparisons.trade(lqr_weights(flown), [periods for periods in plan.KEEPING_PERIODS if periods <= end])
+
+
+def with_and_without_failure(flown: Flown) -> Figure:
+    """LQR with and without communication failure."""
+    return comparisons.over_time(
+        [
+            Course("with communication failure", flown["failure"], FAILED_LQR, "black", "s"),
+            Course("without communication failure", flown["keeping"], LQR, BLUE, "o"),
+        ]
+    )
+
+
+def nearest_lqr(flown: Flown) -> Course:
+    """Of all LQR weights flown, the one whose mean error is nearest to SMC's."""
+    target = flown["keeping"].mean_error()[SMC].mean()
+    flights, policy = min(lqr_weights(flown), key=lambda found: abs(found[0].mean_error()[found[1]].mean() - target))
+    return Course("LQR of nearest mean accuracy", flights, policy, BLUE, "o")
+
+
+def lqr_and_smc(flown: Flown) -> Figure:
+    """SMC beside an LQR of the same accuracy."""
+    return comparisons.in_space([nearest_lqr(flown), Course("SMC", flown["keeping"], SMC, RED, "s")])
+
+
+def lqr_and_smc_in_failure(flown: Flown) -> Figure:
+    """LQR and SMC, both with communication failure."""
+    return comparisons.over_time(
+        [Course("LQR", flown["failure"], FAILED_LQR, BLUE, "o"), Course("SMC", flown["failure"], FAILED_SMC, RED, "s")]
+    )
+
+
+def mission_phases(flown: Flown) -> Figure:
+    """Trajectory of each phase of the mission."""
+    return paths.phase_paths(
+        flown["mission"],
+        0,
+        [
+            ("1 Initialization", 0.0, 0.5),
+            ("2 x-y ellipse keeping", 0.5, 5.05),
+            ("3 Reconfiguration", 5.05, 5.45),
+            ("4 y-z circle keeping", 5.45, 10.05),
+        ],
+        BLUE,
+    )

@@ -1,0 +1,207 @@
+"""What came out: a sentence or two below a figure, with the numbers of the flights behind it."""
+
+from collections.abc import Callable
+from typing import Final
+
+from baselines.report.results import number
+from baselines.thesis import plan
+from baselines.thesis.figures.drawings import (
+    FAILED_LQR,
+    FAILED_SMC,
+    FINER,
+    LQR,
+    MEANT_LQR,
+    MEANT_TRACKING,
+    SMC,
+    Flown,
+)
+from baselines.thesis.flights import Flights
+
+NO_MEASUREMENTS: Final = (
+    "The environments do not give single measurements away, so they are not drawn; at a sigma of 2 m they would lie on "
+    "the true position. "
+)
+READING: Final = "On the dynamics as printed, k of eq. (2.62) without its n, "
+
+
+def _accel(flights: Flights, policy: int) -> str:
+    """Greatest acceleration, mean over the seeds, in words."""
+    return f"{1e3 * flights.max_accel()[policy].mean():.3g} mm/s²"
+
+
+def _mean(flights: Flights, policy: int) -> str:
+    """Mean error, mean over the seeds, in words."""
+    return f"{number(flights.mean_error()[policy].mean())} m"
+
+
+def _max(flights: Flights, policy: int) -> str:
+    """Greatest error, mean over the seeds, in words."""
+    return f"{number(flights.max_error()[policy].mean())} m"
+
+
+def _spent(flights: Flights, policy: int) -> str:
+    """Delta-v, mean over the seeds, in words."""
+    return f"{number(flights.delta_v()[policy].mean())} m/s"
+
+
+def _in_track(flown: Flown) -> str:
+    return (
+        "Eq. (3.7-3.9) are of first order in the Earth's rate over the orbit's: the tracks coincide but for 3 % of "
+        "what the following formation of the same separation misses."
+    )
+
+
+def _initialization(periods: str, printed: str) -> Callable[[Flown], str]:
+    def note(flown: Flown) -> str:
+        flights = flown[f"initialization {periods}"]
+        return (
+            f"The trajectory-following regulator errs by {_max(flights, 0)} at most, with {_accel(flights, 0)}; "
+            f"{printed}. The error is the lag of eq. (4.19), which takes the moving desired state as constant."
+        )
+
+    return note
+
+
+def _transfer_times(flown: Flown) -> str:
+    shortest, middle = flown["initialization 0.1"], flown["initialization 0.4"]
+    return (
+        f"Both fall as one over the transfer time: {_max(shortest, 0)} and {_accel(shortest, 0)} at 0.1 periods, "
+        f"{_max(middle, 0)} and {_accel(middle, 0)} at 0.4. Nothing in these two quantities speaks against more than "
+        "0.8 periods."
+    )
+
+
+def _estimation(flown: Flown) -> str:
+    return NO_MEASUREMENTS + "Cross-track the follower stays behind the desired path, which Figure 5.7 explains."
+
+
+def _keeping(flown: Flown) -> str:
+    printed, meant = flown["keeping"], flown["meant"]
+    share = 100 * (printed.effort()[LQR, :, 2] / printed.effort()[LQR].sum(axis=-1)).mean()
+    return (
+        f"{READING}error-state LQR with the printed weights errs by {_max(printed, LQR)} at most with "
+        f"{_accel(printed, LQR)}, {share:.3g} % of the effort across the plane: the thesis's numbers, but no "
+        f"spacecraft moves like this. With k's n the same law errs by {_mean(meant, MEANT_LQR)} in the mean and "
+        f"spends {_spent(meant, MEANT_LQR)} in place of {_spent(printed, LQR)}; the trajectory-following law of "
+        f"eq. (4.17-4.19) errs by {_mean(meant, MEANT_TRACKING)}."
+    )
+
+
+def _finer(flown: Flown) -> str:
+    return (
+        f"With a = {plan.FINER.control_s2:g} in place of 12000 the greatest error is {_max(flown['keeping'], FINER)}."
+    )
+
+
+def _sweep(flown: Flown) -> str:
+    return (
+        f"Each point is a weight a I / n² with a from {min(plan.SWEEP_S2):g} to {max(plan.SWEEP_S2):g}. {READING}"
+        "consumption grows in proportion to time, and hardly depends on accuracy: it pays for the wrong cross-track "
+        "frequency. The thesis's axis ends at 40; its unit, m/s², hints at a sum of accelerations over samples, which "
+        "equals m/s only if they are 1 s apart."
+    )
+
+
+def _failure(flown: Flown) -> str:
+    greatest = number(flown["failure"].max_error()[FAILED_LQR, 0])
+    return (
+        f"On this seed the error grows to {greatest} m. How far it grows is the initial error's doing, about which the "
+        "thesis says nothing (here 50 m and 0.05 m/s on each axis, 1 sigma)."
+    )
+
+
+def _with_and_without(flown: Flown) -> str:
+    failure, keeping = flown["failure"], flown["keeping"]
+    after_1, after_all = (
+        100 * (failure.mean_error(end)[FAILED_LQR].mean() / keeping.mean_error(end)[LQR].mean() - 1)
+        for end in (1, None)
+    )
+    return (
+        f"The mean error is {after_1:.3g} % larger after one period and {after_all:.3g} % larger after all; means over "
+        f"{len(keeping.seeds)} seeds."
+    )
+
+
+def _smc(flown: Flown) -> str:
+    keeping = flown["keeping"]
+    return (
+        f"{READING}the greatest error is {_max(keeping, SMC)}, the mean {_mean(keeping, SMC)}, and the greatest "
+        f"acceleration {_accel(keeping, SMC)}; the figure's axis for it ends at 20 mm/s²."
+    )
+
+
+def _smc_failure(flown: Flown) -> str:
+    greatest = number(flown["failure"].max_error()[FAILED_SMC, 0])
+    return (
+        f"On this seed the error grows to {greatest} m, and returns slowly: on the printed sliding surface an error "
+        "along x decays with 0.01 / 500 per second only, in half a day."
+    )
+
+
+def _lqr_or_smc(flown: Flown) -> str:
+    failure = flown["failure"]
+    more = 100 * (failure.delta_v()[FAILED_SMC].mean() / failure.delta_v()[FAILED_LQR].mean() - 1)
+    return (
+        f"SMC with the printed gains spends {more:.3g} % more than LQR with the printed weights, but its mean error is "
+        f"{_mean(failure, FAILED_SMC)} against {_mean(failure, FAILED_LQR)}: the thesis's conclusion does not come out."
+    )
+
+
+def _reconfiguration(flown: Flown) -> str:
+    flights = flown["small position error"]
+    return (
+        f"No weight is printed for this section; a = {plan.MANEUVER_S2:g} gives {_accel(flights, 0)}, "
+        f"about the figure's 60 mm/s². After 0.4 periods the error is {number(_after(flights, 0.4))} m."
+    )
+
+
+def _after(flights: Flights, periods: float) -> float:
+    """Error at a time, mean over the seeds of the first policy, m."""
+    place = int(abs(flights.time_s - periods * flights.scenario.orbit.period_s).argmin())
+    return float(flights.position_error_m[place, 0].mean())
+
+
+def _start(name: str, what: str) -> Callable[[Flown], str]:
+    def note(flown: Flown) -> str:
+        return f"{what} It costs {_spent(flown[name], 0)}; from the small position error {_spent(flown[NEAR], 0)}."
+
+    return note
+
+
+def _velocity(values: tuple[float, ...]) -> str:
+    return f"The thesis does not print the velocities; here it starts with {values} m/s."
+
+
+def _mission(flown: Flown) -> str:
+    flights = flown["mission"]
+    return (
+        f"Neither weight nor entry are printed for this section; a = {plan.MANEUVER_S2:g} as in section 5.2.4 gives "
+        f"{_accel(flights, 0)}. The greatest error, {_max(flights, 0)}, is the distance to the circle when the "
+        "formations change; at the entry of section 5.2.4, now on the far side, it would be 5 km."
+    )
+
+
+NEAR: Final = "small position error"
+NOTES: Final[dict[str, Callable[[Flown], str]]] = {
+    "3.4": _in_track,
+    "5.2": _initialization("0.5", "the figure's axes end at 30 m and 20 mm/s²"),
+    "5.3": _initialization("0.1", "the figure's axes end at 150 m and 80 mm/s²"),
+    "5.5": _transfer_times,
+    "5.6": _estimation,
+    "5.7": _keeping,
+    "5.9": _finer,
+    "5.10": _sweep,
+    "5.11": lambda flown: NO_MEASUREMENTS,
+    "5.12": _failure,
+    "5.13": _with_and_without,
+    "5.14": _smc,
+    "5.17": lambda flown: NO_MEASUREMENTS,
+    "5.18": _smc_failure,
+    "5.19": _lqr_or_smc,
+    "5.20": _reconfiguration,
+    "5.22": _start("large position error", "Entry at the opposite point of the circle, [0, −3324, 0, −1.8, 0, −3.6]."),
+    "5.23": _start("small velocity error", _velocity(plan.SMALL_VELOCITY_M_S)),
+    "5.24": _start("large velocity error", _velocity(plan.LARGE_VELOCITY_M_S)),
+    "5.25": _mission,
+}
+"""By the figure's number; figures that need no word have none."""

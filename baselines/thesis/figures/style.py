@@ -1,0 +1,67 @@
+"""What the thesis's figures share: sizes, colours, axes, and how they become files."""
+
+from io import BytesIO
+from typing import Any, Final
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from baselines.report.style import NEUTRAL, looks
+
+WIDTH_IN: Final = 8.0
+DPI: Final = 150
+AXES: Final = (("x", "#009E73", "-"), ("y", "#E69F00", "--"), ("z", "#333333", "-."))
+"""Name, colour and dash of each LVLH axis; Okabe and Ito's colours."""
+COLORS: Final = {name: look.color for name, look in looks(("lqr", "lqr_tracking", "smc")).items()}
+"""Of the policies, as in the report."""
+DESIRED: Final = NEUTRAL
+PLANNED: Final = "#333333"
+START: Final = "#E69F00"
+_SETTINGS: Final = {
+    "svg.hashsalt": "formation-env",  # equal figures are equal files
+    "font.size": 9.0,
+    "axes.grid": True,
+    "grid.alpha": 0.35,
+    "axes.axisbelow": True,
+    "lines.linewidth": 1.3,
+    "legend.frameon": False,
+    "axes.formatter.useoffset": False,
+}
+_NO_DATE: Final = {"svg": {"Date": None, "Creator": None}, "png": {"Software": None}}
+
+
+def settings() -> Any:
+    """A context in which figures are drawn and saved."""
+    return matplotlib.rc_context(_SETTINGS)
+
+
+def sheet(height_in: float) -> Figure:
+    """An empty figure; what is drawn on it is laid out without overlaps."""
+    return Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+
+
+def label(axes: Axes, x: str, y: str) -> Axes:
+    """Name quantity and unit of both axes."""
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    return axes
+
+
+def legend(figure: Figure, axes: Axes, columns: int = 4) -> None:
+    """One legend above all axes, where it hides nothing."""
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=min(columns, len(labels)))
+
+
+def image(figure: Figure, kind: str) -> bytes:
+    """The figure as a file of that kind, `png` or `svg`."""
+    stream = BytesIO()
+    figure.savefig(stream, format=kind, dpi=DPI, metadata=_NO_DATE[kind])
+    return stream.getvalue()
+
+
+def few_ticks() -> MaxNLocator:
+    """For a small axis in space."""
+    return MaxNLocator(4, min_n_ticks=3)

@@ -1,0 +1,111 @@
+"""What is flown for the figures of chapter 5. To read the thesis's settings in another way, change the constants here.
+
+The thesis does not print all settings, and some of those that it prints do not give its figures. Section 5.2.1 comes
+out with the trajectory-following regulator (eq. 4.17-4.19). The closed loops with noise come out with error-state
+feedback of the printed weights, flown on the dynamics as printed (see `formation_env.dynamics.printed_hcw`).
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+from baselines.thesis import scenarios
+from baselines.thesis.jobs import Job, Law
+from formation_env.formations import ProjectedCircle
+from formation_env.scenario import Scenario
+
+DYNAMICS: Final = "printed_hcw"
+"""Of every flight with noise that does not say otherwise."""
+INITIALIZATION: Final = Law("lqr_tracking", "thesis_initialization")
+LQR: Final = Law("lqr", "thesis_keeping")
+FINER: Final = Law("lqr", "thesis_keeping", 4000.0)
+"""With a third of the printed control weight its greatest error is the 175 m of Figure 5.9."""
+TRACKING: Final = Law("lqr_tracking", "thesis_keeping")
+SMC: Final = Law("smc", "thesis_keeping")
+KEEPING: Final = (LQR, FINER, SMC)
+MEANT: Final = (LQR, TRACKING)
+FAILURE: Final = (LQR, SMC)
+SWEEP_S2: Final = (100.0, 300.0, 1000.0, 40000.0, 100000.0, 200000.0)
+"""Factors a of the control weight a I / n^2 that, with those of `KEEPING`, reach the accuracies of Figure 5.10, s^2."""
+MANEUVER_S2: Final = 1500.0
+"""Factor a for sections 5.2.4 and 5.2.5, for which none is printed; it gives the 0.06 m/s^2 of Figure 5.20."""
+RECONFIGURATION: Final = Law("lqr", "thesis_reconfiguration", MANEUVER_S2)
+MISSION: Final = Law("lqr", "thesis_mission", MANEUVER_S2)
+TRANSFER_PERIODS: Final = tuple(round(0.1 * k, 1) for k in range(1, 15))
+"""Transfer times of Figure 5.5, in periods of the orbit."""
+KEEPING_PERIODS: Final = (1, 2, 5, 10)
+"""Keeping times of Figure 5.10, in periods of the orbit."""
+FAR_ENTRY: Final = ProjectedCircle(x0_m=0.0, vx0_m_s=-1.8)
+"""The opposite point of the circle, [0, -3324, 0, -1.8, 0, -3.6]: 8.3 km away from the following orbit's 5 km."""
+MISSION_ENTRY: Final = FAR_ENTRY
+"""After the ellipse the follower is on the other side of the leader; the entry near to it gives Figure 5.25."""
+SMALL_VELOCITY_M_S: Final = (2.0, 2.0, 0.0)
+LARGE_VELOCITY_M_S: Final = (30.0, 30.0, 0.0)
+"""Initial velocities on the following orbit, where none would be right; the thesis does not print its own."""
+KEPT_S: Final = 20.0
+"""Time between the instants that are kept of long flights."""
+
+
+def printed(scenario: Scenario) -> Scenario:
+    """A scenario on the dynamics as printed."""
+    return replace(scenario, dynamics=DYNAMICS)
+
+
+def jobs(seeds: Sequence[int], dt_s: float | None = None, periods: float = 10.0) -> dict[str, Job]:
+    """All flights of the figures by name.
+
+    Args:
+        seeds: one per episode of each law; flights without noise have one.
+        dt_s: time step, s; the shipped scenarios' 1 s if left out.
+        periods: keeping time, in periods of the orbit; 10 in the thesis.
+    """
+    return {
+        **initializations(dt_s),
+        **keepings(tuple(seeds), dt_s, periods),
+        **reconfigurations(tuple(seeds), dt_s),
+        "mission": _long(printed(scenarios.mission(dt_s, MISSION_ENTRY)), (MISSION,), tuple(seeds)),
+    }
+
+
+def initializations(dt_s: float | None = None) -> dict[str, Job]:
+    """Section 5.2.1: one flight for each transfer time."""
+    found = {}
+    for periods in TRANSFER_PERIODS:
+        scenario = scenarios.initialization(periods, dt_s)
+        found[f"initialization {periods:g}"] = Job(scenario, (INITIALIZATION,), (0,), guide="straight_line")
+    return found
+
+
+def keepings(seeds: tuple[int, ...], dt_s: float | None = None, periods: float = 10.0) -> dict[str, Job]:
+    """Sections 5.2.2 and 5.2.3: keeping the space circle, with and without failure."""
+    keeping = scenarios.keeping(periods, dt_s)
+    failure = scenarios.keeping_failure(periods, dt_s=dt_s)
+    sweep = tuple(Law("lqr", "thesis_keeping", factor) for factor in SWEEP_S2)
+    return {
+        "keeping": _long(printed(keeping), KEEPING, seeds),
+        "meant": _long(keeping, MEANT, seeds),
+        "failure": _long(printed(failure), FAILURE, seeds),
+        "sweep 1": _long(printed(keeping), sweep[::2], seeds),
+        "sweep 2": _long(printed(keeping), sweep[1::2], seeds),
+    }
+
+
+def reconfigurations(seeds: tuple[int, ...], dt_s: float | None = None) -> dict[str, Job]:
+    """Section 5.2.4: from the following orbit to the projected circle, from better and worse starts."""
+    near = printed(scenarios.reconfiguration(dt_s=dt_s))
+    far = printed(scenarios.reconfiguration(FAR_ENTRY, dt_s=dt_s))
+    slow, fast = (
+        tuple(scenarios.with_velocity(near, velocity)) for velocity in (SMALL_VELOCITY_M_S, LARGE_VELOCITY_M_S)
+    )
+    crew = (RECONFIGURATION,)
+    return {
+        "small position error": Job(near, crew, seeds),
+        "large position error": Job(far, crew, seeds),
+        "small velocity error": Job(near, crew, seeds, start=slow),
+        "large velocity error": Job(near, crew, seeds, start=fast),
+    }
+
+
+def _long(scenario: Scenario, laws: tuple[Law, ...], seeds: tuple[int, ...]) -> Job:
+    """A job of a long scenario, of which not every step is kept."""
+    return Job(scenario, laws, seeds, every=max(1, round(KEPT_S / scenario.dt_s)))
