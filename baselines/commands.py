@@ -58,7 +58,10 @@ def run_report(
 def reproduce(
     episodes: Annotated[int, typer.Option(min=1, help="Test seeds of each flight with noise.")] = 50,
     out: Out = Path("reports/thesis"),
-    step_s: Annotated[float | None, typer.Option(help="Time step, s; a coarse one for a quick look.")] = None,
+    step_s: Annotated[
+        float | None,
+        typer.Option(min=0.1, max=60.0, help="Time step, s; 1 if left out, a coarse one for a quick look."),
+    ] = None,
     processes: Annotated[int, typer.Option(min=1, help="To fly in.")] = min(2, os.cpu_count() or 1),
 ) -> None:
     """Redraw the thesis's figures, and write them and one HTML page of all."""

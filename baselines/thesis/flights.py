@@ -151,10 +151,15 @@ def fly(
 
 def kept_steps(scenario: Scenario, every: int) -> NDArray[np.intp]:
     """Every so many steps, all whole periods, and the beginnings, arrivals and ends of phases."""
-    last = scenario.num_steps
-    periods = [scenario.steps(k) for k in range(1 + int(last * scenario.dt_s / scenario.orbit.period_s))]
+    periods = [scenario.steps(time) for time in whole_periods(scenario)]
     marks = [step for leg in legs(scenario) for step in (leg.start, leg.arrival, leg.end)]
-    return np.unique(np.array([*range(0, last, every), *(step for step in periods if step <= last), *marks], np.intp))
+    return np.unique(np.array([*range(0, scenario.num_steps, every), *periods, *marks], np.intp))
+
+
+def whole_periods(scenario: Scenario) -> list[int]:
+    """How many orbital periods have passed at each whole one, from 1 on."""
+    longest = round(scenario.num_steps * scenario.dt_s / scenario.orbit.period_s)
+    return [time for time in range(1, longest + 1) if scenario.steps(time) <= scenario.num_steps]
 
 
 def desired_states(scenario: Scenario, guide: Guide) -> Array:

@@ -79,8 +79,7 @@ def fly(wanted: Mapping[str, jobs.Job], workers: int) -> dict[str, Flights]:
 
 def _draw(number: str, figure: Figure, flown: Mapping[str, Flights], contents: dict[str, Any]) -> Picture:
     """Draw a figure, add its files to the folder's contents, and give it as it stands on the page."""
-    drawn = figure.draw(flown)
-    svg = style.image(drawn, "svg")
-    picture = Picture(number, figure.title, figure.sentence, figure.note(number, flown), svg)
-    contents |= {f"{picture.anchor}.svg": svg, f"{picture.anchor}.png": style.image(drawn, "png")}
+    images = style.images(figure.draw(flown))
+    picture = Picture(number, figure.title, figure.sentence, figure.note(number, flown), images["svg"])
+    contents |= {f"{picture.anchor}.{kind}": image for kind, image in images.items()}
     return picture

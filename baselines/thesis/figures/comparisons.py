@@ -11,7 +11,7 @@ from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 
 from baselines.thesis.figures import style
-from baselines.thesis.flights import Flights
+from baselines.thesis.flights import Flights, whole_periods
 from formation_env.dynamics.base import Array
 
 PERIODS = "Time [period]"
@@ -39,7 +39,7 @@ class Course:
     @property
     def periods(self) -> list[int]:
         """Whole periods of the flight."""
-        return list(range(1, 1 + int(self.flights.time_s[-1] / self.flights.scenario.orbit.period_s + 1e-3)))
+        return whole_periods(self.flights.scenario)
 
     def so_far(self, quantity: str) -> Array:
         """One of `mean_error`, `max_error` and `delta_v` of `Flights`, up to each period (periods,)."""

@@ -8,7 +8,7 @@ from baselines.thesis import plan
 from baselines.thesis.figures import comparisons, panels, paths, style
 from baselines.thesis.figures.comparisons import Course
 from baselines.thesis.figures.panels import Line
-from baselines.thesis.flights import Flights
+from baselines.thesis.flights import Flights, whole_periods
 
 Flown = Mapping[str, Flights]
 Draw = Callable[[Flown], Figure]
@@ -52,9 +52,8 @@ def lqr_weights(flown: Flown) -> list[tuple[Flights, int]]:
 
 def weights(flown: Flown) -> Figure:
     """Consumption against accuracy of all LQR weights."""
-    keeping = flown["keeping"]
-    end = keeping.time_s[-1] / keeping.scenario.orbit.period_s + 1e-3
-    return comparisons.trade(lqr_weights(flown), [periods for periods in plan.KEEPING_PERIODS if periods <= end])
+    flown_periods = whole_periods(flown["keeping"].scenario)
+    return comparisons.trade(lqr_weights(flown), [time for time in plan.KEEPING_PERIODS if time in flown_periods])
 
 
 def with_and_without_failure(flown: Flown) -> Figure:

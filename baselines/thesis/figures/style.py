@@ -55,11 +55,15 @@ def legend(figure: Figure, axes: Axes, columns: int = 4) -> None:
     figure.legend(handles, labels, loc="outside upper center", ncols=min(columns, len(labels)))
 
 
-def image(figure: Figure, kind: str) -> bytes:
-    """The figure as a file of that kind, `png` or `svg`."""
-    stream = BytesIO()
-    figure.savefig(stream, format=kind, dpi=DPI, metadata=_NO_DATE[kind])
-    return stream.getvalue()
+def images(figure: Figure) -> dict[str, bytes]:
+    """The figure as files, by kind: `svg` and `png`. It is laid out once, for that takes longest."""
+    result = {}
+    for kind, metadata in _NO_DATE.items():
+        stream = BytesIO()
+        figure.savefig(stream, format=kind, dpi=DPI, metadata=metadata)
+        figure.set_layout_engine("none")
+        result[kind] = stream.getvalue()
+    return result
 
 
 def few_ticks() -> MaxNLocator:
