@@ -59,18 +59,18 @@ def reproduce(
     episodes: Annotated[int, typer.Option(min=1, help="Test seeds of each flight with noise.")] = 50,
     out: Out = Path("reports/thesis"),
     step_s: Annotated[
-        float | None,
-        typer.Option(min=0.1, max=60.0, help="Time step, s; 1 if left out, a coarse one for a quick look."),
-    ] = None,
+        float, typer.Option(min=0.1, max=60.0, help="Time step, s; a coarse one for a quick look.")
+    ] = 1.0,
+    claims: Annotated[bool, typer.Option(help="Judge the claims, too.")] = True,
     processes: Annotated[int, typer.Option(min=1, help="To fly in.")] = min(2, os.cpu_count() or 1),
 ) -> None:
-    """Redraw the thesis's figures, and write them and one HTML page of all."""
+    """Redraw the thesis's figures, judge its claims, and write both, and one HTML page of all."""
     command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
 
     def write() -> Path:
-        from baselines.thesis.report import write_thesis
+        from baselines.thesis.report import Wanted, write_thesis
 
-        return write_thesis(out, episodes, command, processes, step_s)
+        return write_thesis(out, Wanted(episodes, step_s, claims=claims), command, processes)
 
     _run("reproduce", out, write)
 

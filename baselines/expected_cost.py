@@ -5,7 +5,8 @@ a quadratic cost has the same sum, and its minimum moves towards the least E|u| 
 doi 10.1002/cpa.20303, for sums without expectation). The rms values follow from the nominal start, its spread, and the
 noises, as if no measurement were lost.
 
-Legend: Phi, Gamma model; K gain; P covariance of the estimate's error, X of the estimate; S innovation covariance.
+Legend: Phi, Gamma model; K gain (the filter's in `knowledge`); P covariance of the estimate's error, X of the estimate;
+S innovation covariance.
 """
 
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from typing import Final
 
 import numpy as np
 
+from baselines.kalman import measurement
 from baselines.riccati import OVERLOAD, time_varying_gains
 from baselines.timeline import start_error
 from formation_env.dynamics.base import Array, DiscreteModel
@@ -43,16 +45,18 @@ class Knowledge:
 def knowledge(scenario: Scenario, model: DiscreteModel) -> Knowledge:
     """The filter's covariances over an episode in which all measurements arrive (Ma 2009, eq. 4.71-4.75)."""
     belief, start = scenario.belief, scenario.start
-    H = np.eye(6) if scenario.sensor.measures == "position_and_velocity" else np.eye(3, 6)
-    R_noise = np.diag(np.repeat([belief.sigma_pos_m, belief.sigma_vel_m_s], 3) ** 2)[: len(H), : len(H)]
+    H, R_noise = measurement(scenario)
     P = np.diag(np.repeat([start.spread_pos_m, start.spread_vel_m_s], 3) ** 2)
     model = model.steps(0, scenario.num_steps)
     Q_noise = process_noise_covariance(model.Gamma, belief.process_noise_m_s2)
     missed, learned = np.zeros((2, scenario.num_steps + 1, 6, 6))
     for step in range(scenario.num_steps + 1):
         S = H @ P @ H.T + R_noise
-        learned[step] = P @ H.T @ np.linalg.pinv(S, hermitian=True) @ H @ P
-        missed[step] = P - learned[step]
+        K = P @ H.T @ np.linalg.pinv(S, hermitian=True)
+        learned[step] = K @ S @ K.T
+        # Joseph's form: P - K S K' is not positive where a sensor without noise leaves nothing
+        rest = np.eye(6) - K @ H
+        missed[step] = rest @ P @ rest.T + K @ R_noise @ K.T
         if step < scenario.num_steps:
             P = model.Phi[step] @ missed[step] @ model.Phi[step].T + Q_noise[step]
     return Knowledge(missed, learned)

@@ -2,6 +2,8 @@
 
 - `automatic`: the reference, even before the arrival, so the controller finds the way (Ma 2009, section 3.2.3);
 - `straight_line`: to the arrival on a straight line in LVLH at constant speed (section 3.2.2);
+- `two_impulse`: to the arrival on the coasting path between two impulses, `transfers.two_impulse`;
+- `hohmann`: the same, but half a period after the start it is on the reference and stays there (section 3.2.1);
 - `least_fuel`: to the arrival on the path of few burns that `riccati.least_fuel_gains` finds for the nominal start;
 - `least_cost`: through the whole phase on the mean path of `expected_cost`, which may settle after the arrival.
 """
@@ -18,14 +20,18 @@ from baselines.expected_cost import expected_cost_gains
 from baselines.policy import Observations
 from baselines.riccati import closed_loop, least_fuel_gains
 from baselines.timeline import by_steps_left, nominal_start, start_error, transfer_reference
-from formation_env.dynamics.base import Array
+from baselines.transfers import two_impulse
+from formation_env.dynamics.base import Array, DiscreteModel
 from formation_env.scenario import Scenario
 from formation_env.schedule import Leg, leg_reference, observation_layout
+from formation_env.settings import ConfigError
 
-Guide = Literal["automatic", "straight_line", "least_fuel", "least_cost"]
+Guide = Literal["automatic", "straight_line", "two_impulse", "hohmann", "least_fuel", "least_cost"]
 
 _ARRIVAL_WEIGHT = 1e9
 """Of the planned path's error at the arrival, against its acceleration in the thesis's units: nearly a constraint."""
+_SAME_PLANE_M = 1e-3
+"""Amplitude of a motion across the plane that rounding may leave, m."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +65,12 @@ class Guidance:
     def __init__(self, scenario: Scenario, guide: Guide) -> None:
         self._dt_s = scenario.dt_s
         self._layout = observation_layout(scenario)
-        self._offsets = by_steps_left(scenario, lambda leg: _desired(scenario, leg, guide) - _reference(scenario, leg))
-        self.residuals = by_steps_left(scenario, lambda leg: _residual(scenario, leg, _desired(scenario, leg, guide)))
+        self._offsets = by_steps_left(
+            scenario, lambda leg: desired_states(scenario, leg, guide) - _reference(scenario, leg)
+        )
+        self.residuals = by_steps_left(
+            scenario, lambda leg: _residual(scenario, leg, desired_states(scenario, leg, guide))
+        )
 
     def track(self, observation: Observations) -> Tracking:
         """Compare the estimate with the desired path.
@@ -89,7 +99,7 @@ def _reference(scenario: Scenario, leg: Leg) -> Array:
     return leg_reference(scenario, leg, np.arange(leg.start, leg.end + 1))
 
 
-def _desired(scenario: Scenario, leg: Leg, guide: Guide) -> Array:
+def desired_states(scenario: Scenario, leg: Leg, guide: Guide) -> Array:
     """Desired states (steps + 1, 6) of a phase: the path, and where it ends the reference."""
     path = desired_path(scenario, leg, guide)
     return np.concatenate([path, _reference(scenario, leg)[len(path) :]])
@@ -125,6 +135,51 @@ def straight_line(scenario: Scenario, leg: Leg) -> Array:
     return line
 
 
+def two_impulse_path(scenario: Scenario, leg: Leg) -> Array:
+    """The coasting path from the nominal start to the arrival by the filter's model, states (steps + 1, 6).
+
+    The first state has the first impulse in it, the last one the second.
+
+    Raises:
+        ConfigError: no two impulses reach the goal in this time.
+    """
+    return _coast_to(scenario, leg, leg.arrival)
+
+
+def hohmann_path(scenario: Scenario, leg: Leg) -> Array:
+    """The coasting path of half a period to the reference, then the reference to the arrival, states (steps + 1, 6).
+
+    Where the target is due at another place than Hohmann's ellipse ends, a radial part of the impulses makes up for it.
+
+    Raises:
+        ConfigError: the transfer is shorter than half a period, or not in one plane.
+    """
+    key, meeting = f"guidance: hohmann: phases.{leg.index}", leg.start + scenario.steps(0.5)
+    if meeting > leg.arrival:
+        given = leg.phase.transfer_periods
+        raise ConfigError(f"{key}.transfer_periods: must be at least 0.5, half a period, got {given:g}")
+    off_plane_m = np.hypot(*(start_error(scenario, leg)[[2, 5]] / [1, scenario.orbit.mean_motion_rad_s]))
+    if off_plane_m > _SAME_PLANE_M:
+        raise ConfigError(f"{key}.formation: must be in the plane of the phase's start, is {off_plane_m:.4g} m off it")
+    wait = leg_reference(scenario, leg, np.arange(meeting + 1, leg.arrival + 1))
+    return np.vstack([_coast_to(scenario, leg, meeting), wait])
+
+
+def _coast_to(scenario: Scenario, leg: Leg, meeting: int) -> Array:
+    """Two impulses' path from the nominal start to the reference at a step, states (meeting - leg.start + 1, 6)."""
+    time_s = scenario.dt_s * (meeting - leg.start)
+    model = scenario.filter_model().steps(leg.start, meeting).from_start()
+    whole = DiscreteModel(model.Phi[-1], model.Gamma[-1], model.delta[-1])
+    start, goal = nominal_start(scenario, leg), leg_reference(scenario, leg, np.array(meeting))
+    try:
+        impulses = two_impulse(whole, time_s, scenario.orbit.mean_motion_rad_s, start, goal)
+    except ValueError as error:
+        raise ConfigError(f"guidance: phases.{leg.index}.transfer_periods: {error}") from None
+    path: Array = model.Phi @ (start + np.concatenate([np.zeros(3), impulses.first_m_s])) + model.delta
+    path[-1] = goal
+    return path
+
+
 @lru_cache(maxsize=64)
 def least_fuel_path(scenario: Scenario, leg: Leg) -> Array:
     """The path of few burns from the nominal start to the arrival by the filter's model, states (steps + 1, 6)."""
@@ -152,6 +207,8 @@ def least_cost_path(scenario: Scenario, leg: Leg) -> Array:
 PATHS: Final[dict[str, Callable[[Scenario, Leg], Array]]] = {
     "automatic": transfer_reference,
     "straight_line": straight_line,
+    "two_impulse": two_impulse_path,
+    "hohmann": hohmann_path,
     "least_fuel": least_fuel_path,
     "least_cost": least_cost_path,
 }

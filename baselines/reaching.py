@@ -1,4 +1,7 @@
-"""Reaching laws of the sliding mode controller. To add one: a class here, and a line in `REACHING_LAWS`."""
+"""How the sliding mode controller comes to its surface: reaching laws, or a relay.
+
+To add a law: a class with `change` here, and a line in `REACHING_LAWS`.
+"""
 
 from typing import Annotated, Final, Literal
 
@@ -61,9 +64,24 @@ class PowerReaching:
         return -self.k_m_s * step_s * np.abs(s) ** self.alpha * sign
 
 
+@settings
+class Relay:
+    """u = u0 sgn s on each axis, whatever model and path (Ma 2009, eq. 4.23, 4.28-4.30).
+
+    It reaches the surface if u0 exceeds all else that accelerates the error, u0 > f0 + |r'| there.
+
+    Attributes:
+        u0_m_s2: acceleration of each axis, m/s^2.
+    """
+
+    kind: Literal["relay"] = "relay"
+    u0_m_s2: Positive = 0.002
+
+
 REACHING_LAWS: Final[dict[str, type]] = {
     "constant": ConstantReaching,
     "exponential": ExponentialReaching,
     "power": PowerReaching,
+    "relay": Relay,
 }
-AnyReaching = Annotated[ConstantReaching | ExponentialReaching | PowerReaching, OneOf(REACHING_LAWS)]
+AnyReaching = Annotated[ConstantReaching | ExponentialReaching | PowerReaching | Relay, OneOf(REACHING_LAWS)]

@@ -1,12 +1,14 @@
 """Linear quadratic regulators: gains from Riccati equations.
 
-Legend: A, B and Phi, Gamma continuous and discrete model; Q, R weights; P cost-to-go; K gain of u = -K x.
+Legend: A, B and Phi, Gamma continuous and discrete model; Q, R weights; P cost-to-go; K gain of u = -K x; y_d desired
+state, g its pull in u = -R^-1 B' P x + R^-1 B' g.
 """
 
 from typing import Final
 
 import control
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from formation_env.dynamics.base import Array
 
@@ -23,8 +25,13 @@ def stationary(Phi: Array, Gamma: Array, Q: Array, R: Array) -> tuple[Array, Arr
         Q: state weight (6, 6).
         R: control weight (3, 3).
     """
-    K, P, _ = control.dlqr(Phi, Gamma, Q, R)
-    return np.asarray(K), np.asarray(P)
+    # In units of the loop itself (c per s^2 of acceleration, c^(-1/2) s of time): in SI the solver fails at some steps.
+    c = np.sqrt(np.trace(Q[:3, :3]) / np.trace(R)) or 1.0
+    scale = np.repeat([1.0, np.sqrt(c)], 3)
+    K, P, _ = control.dlqr(
+        Phi * scale / scale[:, None], Gamma * c / scale[:, None], Q * np.outer(scale, scale), R * c**2
+    )
+    return np.asarray(c * K / scale), np.asarray(P / np.outer(scale, scale))
 
 
 def continuous_gain(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
@@ -38,6 +45,50 @@ def continuous_gain(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Arra
     """
     K, P, _ = control.lqr(A, B, Q, R)
     return np.asarray(K), np.asarray(P)
+
+
+def integrate_tracking(
+    A: Array, B: Array, Q: Array, R: Array, times_s: Array, desired: Array, P_end: Array, g_end: Array
+) -> tuple[Array, Array]:
+    """P and g of a finite horizon in continuous time, integrated backwards (Ma 2009, eq. 4.13-4.14, 4.17).
+
+    They minimise the integral of (x - y_d)' Q (x - y_d) + u' R u, plus x' P_end x - 2 x' g_end at the end (Anderson &
+    Moore, Optimal Control, section 4.1). P is the regulator's, whatever y_d. Ma 2009, eq. (4.19), drops g'.
+
+    Args:
+        A: state matrix (m, m).
+        B: control matrix (m, k).
+        Q: state weight (m, m).
+        R: control weight (k, k).
+        times_s: increasing instants (T,), s.
+        desired: y_d (T, m) at the instants; straight between them.
+        P_end: terminal weight (m, m).
+        g_end: terminal pull (m,); P_end y_d for a weight of the last error.
+
+    Returns:
+        P (T, m, m) and g (T, m) at the instants.
+    """
+    size, control_cost = len(A), B @ np.linalg.solve(R, B.T)
+
+    def rates(time_s: float, packed: Array) -> Array:
+        P, g = packed[:-size].reshape(size, size), packed[-size:]
+        # P' + A' P + P A - P B R^-1 B' P + Q = 0 (4.13)
+        half = P @ A - 0.5 * P @ control_cost @ P
+        # g' = -(A - B R^-1 B' P)' g - Q y_d
+        g_rate = -(A - control_cost @ P).T @ g - Q @ _between(time_s, times_s, desired)
+        return np.concatenate([(-half - half.T - Q).ravel(), g_rate])
+
+    end, span = np.concatenate([P_end.ravel(), g_end]), (times_s[-1], times_s[0])
+    packed = solve_ivp(rates, span, end, "DOP853", t_eval=times_s[::-1], rtol=1e-8, atol=1e-8).y.T[::-1]
+    return packed[:, :-size].reshape(-1, size, size), packed[:, -size:]
+
+
+def _between(time_s: float, times_s: Array, values: Array) -> Array:
+    """Value (m,) at a time on the straight lines between values (T, m) at increasing times (T,), s."""
+    after = min(max(int(np.searchsorted(times_s, time_s)), 1), len(times_s) - 1)
+    share = (time_s - times_s[after - 1]) / (times_s[after] - times_s[after - 1])
+    value: Array = values[after - 1] + share * (values[after] - values[after - 1])
+    return value
 
 
 def finite_horizon_gains(Phi: Array, Gamma: Array, Q: Array, R: Array, terminal: Array) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 
 from baselines.guidance import Guidance, Guide
 from baselines.policy import AccelerationPolicy, Observations
-from baselines.reaching import AnyReaching, ExponentialReaching
+from baselines.reaching import AnyReaching, ExponentialReaching, Relay
 from baselines.surfaces import AnySurface, PlacedSurface
 from baselines.timeline import by_steps_left
 from formation_env.dynamics.base import Array, DiscreteModel
@@ -19,7 +19,7 @@ class SMCSettings:
     Attributes:
         guidance: the desired path, see `baselines.guidance`.
         surface: the sliding surface s = Ce e.
-        reaching: how s comes to zero.
+        reaching: how s comes to zero, by a reaching law or a relay.
         boundary_m: thickness Delta of the boundary layer, within which sgn s is replaced by s / Delta, m; 0 is none.
     """
 
@@ -30,7 +30,7 @@ class SMCSettings:
 
 
 class SMC(AccelerationPolicy):
-    """u = (Ce Gamma)^-1 (Ce x_d(k+1) - Ce Phi x(k) - s(k+1)), s = Ce (x_d - x) (Ma 2009, eq. 4.59-4.61)."""
+    """u = (Ce Gamma)^-1 (Ce x_d(k+1) - Ce Phi x(k) - s(k+1)), s = Ce (x_d - x) (Ma 2009, eq. 4.59-4.61), or a relay."""
 
     Settings = SMCSettings
 
@@ -49,14 +49,17 @@ class SMC(AccelerationPolicy):
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
         now = self._guidance.track(observation)
+        s, reaching = -now.error @ self.Ce.T, self.gains.reaching
+        if isinstance(reaching, Relay):
+            return reaching.u0_m_s2 * self.sign(s)
         # Ce x_d(k+1) - Ce Phi x(k) = Ce residual - Ce Phi (x - x_d): the path's own thrust, and the error's free motion
         at = (now.phase, now.steps_left)
         free = now.residual @ self.Ce.T - (self._Ce_Phi[at] @ now.error[..., None])[..., 0]
-        wanted = free - self.next_surface(-now.error @ self.Ce.T)
-        return np.asarray((self._inverse[at] @ wanted[..., None])[..., 0])
+        # s(k+1) by the reaching law (eq. 4.56)
+        following = s + reaching.change(s, self.sign(s), self.scenario.dt_s)
+        return np.asarray((self._inverse[at] @ (free - following)[..., None])[..., 0])
 
-    def next_surface(self, s: Array) -> Array:
-        """Where the reaching law takes s (..., 3) in one step, m (eq. 4.56)."""
+    def sign(self, s: Array) -> Array:
+        """Sgn s (..., 3), or sat(s / Delta) with a boundary layer."""
         boundary = self.gains.boundary_m
-        sign = np.clip(s / boundary, -1.0, 1.0) if boundary > 0 else np.sign(s)
-        return s + self.gains.reaching.change(s, sign, self.scenario.dt_s)
+        return np.clip(s / boundary, -1.0, 1.0) if boundary > 0 else np.sign(s)

@@ -33,6 +33,28 @@ def test_knowledge_settles_at_the_riccati_equation() -> None:
         np.testing.assert_allclose(known.learned[-1], gain @ H @ P, rtol=1e-3, atol=1e-9)
 
 
+@pytest.mark.parametrize("dt_s", [2.0, 30.0])
+def test_a_perfect_sensor_leaves_nothing_unknown(dt_s: float) -> None:
+    """With R_noise = 0 each measurement is the state: missed is 0, learned what the process noise was (eq. 4.75).
+
+    Q_noise = Gamma Gamma' sigma^2 has rank 3, so S can hardly be inverted; 1e-7 m of rounding is left at most.
+    """
+    scenario = dataclasses.replace(
+        load_scenario("keeping"),
+        dt_s=dt_s,
+        sensor=Sensor(sigma_pos_m=0.0, sigma_vel_m_s=0.0),
+        process_noise_m_s2=1e-3,
+    )
+    model = scenario.filter_model()
+    known = knowledge(scenario, model)
+    assert np.abs(known.missed).max() < 1e-14
+    Q_noise = 1e-6 * model.Gamma @ model.Gamma.T
+    np.testing.assert_allclose(
+        known.learned[1:], np.tile(Q_noise, (scenario.num_steps, 1, 1)), atol=1e-9 * Q_noise.max()
+    )
+    assert np.isfinite(expected_cost_gains(scenario, rounds=0)[0]).all()
+
+
 def test_predicted_scatter_is_what_is_flown() -> None:
     """Root mean squares of thrust and error at every step, over 1000 flights without dropout.
 

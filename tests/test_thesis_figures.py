@@ -17,11 +17,11 @@ from typer.testing import CliRunner
 
 from baselines.__main__ import app
 from baselines.registry import make_policy
-from baselines.thesis import jobs, plan, report, scenarios, tables
+from baselines.thesis import claims, jobs, plan, report, scenarios, tables
 from baselines.thesis.claim import Claim
 from baselines.thesis.figures import FIGURES, drawings, orbits, style
 from baselines.thesis.flights import Flights, desired_states, fly
-from baselines.thesis.page import Picture, render
+from baselines.thesis.report_page import Content, Picture, render
 from formation_env import load_scenario
 from formation_env.constants import OMEGA_EARTH, R_EARTH
 from formation_env.evaluation import evaluate
@@ -33,6 +33,12 @@ ROOT = Path(__file__).parents[1]
 COARSE_S = 30.0
 PRINTED_START = [2000, 369.3, 3464.1, 0.2, -4.3, 0.3]
 CLAIM = Claim("5.2.1", "a < b & c", "< 30 m", "26.6 m", 26.5, None, "holds", "T = 1 s", "the lag")
+TABLES = claims.Tables(
+    [CLAIM],
+    noise=pd.DataFrame([{"section": "5.2.2", "low": 0.123456, "high": np.nan}]),
+    readings=pd.DataFrame([{"reading": "k <printed>", "gives_the_figures": True}]),
+    fair=pd.DataFrame([{"truth": "nonlinear", "fails": False}]),
+)
 
 
 @pytest.fixture(scope="module")
@@ -156,8 +162,8 @@ def test_initialization_is_the_printed_one(periods: float, error_m: float, accel
 def test_keeping_is_the_printed_one() -> None:
     """Figure 5.7 at 1 s: 300 m, below 4e-3 m/s^2, most of it across the plane; 2 % for reading off a figure.
 
-    In closed form: k^2 - n^2 times 3464 m is 2.94e-3 m/s^2, which LQR's stiffness n / sqrt(a) answers by about 300 m. The
-    rest of the effort undoes the unknown start.
+    In closed form: k^2 - n^2 times 3464 m is 2.94e-3 m/s^2, which LQR's stiffness n / sqrt(a) answers by about 300 m.
+    The rest of the effort undoes the unknown start.
     """
     job = plan.keepings((0,), periods=1.0)["keeping"]
     flights = replace(job, laws=(plan.LQR,)).fly(lambda cost: None)
@@ -224,7 +230,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory, flown: dict[str, Flights]) 
     out = tmp_path_factory.mktemp("thesis") / "deep" / "folder"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(report, "fly", lambda wanted, workers: flown)
-        page = report.write_thesis(out, 2, "the <command>", 1, COARSE_S, 2.3, claims=[CLAIM])
+        patch.setattr(claims, "tables", lambda flown, effort: TABLES)
+        page = report.write_thesis(out, report.Wanted(2, COARSE_S, 2.3), "the <command>", 1)
     assert page == out / report.PAGE
     return out
 
@@ -232,7 +239,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory, flown: dict[str, Flights]) 
 def test_all_files_and_nothing_else(folder: Path) -> None:
     """PNG and SVG of each figure, the page, the claims; no temporaries."""
     images = {f"figure-{number.replace('.', '-')}.{kind}" for number in FIGURES for kind in ("png", "svg")}
-    assert {path.name for path in folder.iterdir()} == images | {report.PAGE, "claims.csv", "claims.json"}
+    images |= {report.PAGE, "claims.json"}
+    images |= {f"{name}.csv" for name in ("claims", "readings", "noise", "fair")}
+    assert {path.name for path in folder.iterdir()} == images
     for path in folder.glob("*.png"):
         assert path.read_bytes().startswith(b"\x89PNG")
 
@@ -253,12 +262,16 @@ def test_page_holds_every_figure_and_loads_nothing(folder: Path) -> None:
 
 
 def test_claims_come_back_from_their_files(folder: Path) -> None:
-    """CSV by pandas and JSON by the standard library give the claim that was written."""
+    """CSV by pandas and JSON by the standard library give what was written; the page shows it for people."""
     table = pd.read_csv(folder / "claims.csv")
     assert table.loc[0, "sentence"] == CLAIM.sentence
     assert np.isnan(table.loc[0, "high"])
     (entry,) = json.loads((folder / "claims.json").read_text(encoding="utf-8"))
     assert Claim(**entry) == CLAIM
+    pd.testing.assert_frame_equal(pd.read_csv(folder / "noise.csv", dtype={"section": str}), TABLES.noise)
+    page = (folder / report.PAGE).read_text(encoding="utf-8")
+    for cell in ("a &lt; b &amp; c", "0.123", "–", "k &lt;printed&gt;", "yes", "no"):
+        assert f"<td>{cell}</td>" in page
     assert tables.to_csv([]).strip() == ",".join(table.columns)
     with pytest.raises(ValueError, match=r"claim 5\.2\.1: verdict must be one of"):
         replace(CLAIM, verdict="maybe")  # type: ignore[arg-type]
@@ -267,10 +280,10 @@ def test_claims_come_back_from_their_files(folder: Path) -> None:
 def test_sections_without_content_are_left_out() -> None:
     """Neither claims nor model errors are announced where there are none; a model error is shown where there is one."""
     facts = {"command": "c", "episodes": 1, "step_s": "1", "versions": {"python": "3"}}
-    empty = render([], [], [], facts)
+    empty = render(Content([]), facts)
     assert "Claims" not in empty
     assert "linear world" not in empty
-    shown = render([], [], [Picture("", "HCW by size", "", "It grows.", b"<svg/>")], facts)
+    shown = render(Content([], model_errors=[Picture("", "HCW by size", "", "It grows.", b"<svg/>")]), facts)
     assert "What the linear world hides" in shown
     assert "HCW by size" in shown
 
@@ -287,7 +300,7 @@ def test_a_failure_leaves_the_old_files(folder: Path, monkeypatch: pytest.Monkey
     for number in list(FIGURES)[:-1]:
         monkeypatch.delitem(FIGURES, number)
     with pytest.raises(RuntimeError, match="no ink"):
-        report.write_thesis(folder, 1, "c", 1)
+        report.write_thesis(folder, report.Wanted(1), "c", 1)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
@@ -322,6 +335,6 @@ def test_ctrl_c_ends_all_processes_in_one_line(tmp_path: Path) -> None:
         process.send_signal(signal.SIGTERM)
         rest = process.stderr.read()
     assert process.returncode == 130
-    assert rest.splitlines()[-1] == "reproduce: interrupted, nothing written"
+    assert rest.endswith("reproduce: interrupted, nothing written\n")
     assert "Traceback" not in rest
     assert not out.exists()

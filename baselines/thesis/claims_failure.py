@@ -9,8 +9,9 @@ from formation_env.dynamics.base import Array
 
 FAILURE_S = 3000.0
 _WHY_DRIFT = (
-    "Both laws follow the estimate, whose start is wrong by 50 m and 0.05 m/s here; an along-track velocity error of v "
-    "drifts by up to 3 v t, so the error at the end of the failure is a statement about the unknown start and nothing else."
+    "Both laws follow the estimate, whose start is wrong by 50 m and 0.05 m/s here; an along-track velocity "
+    "error of v drifts by up to 3 v t, so the error at the end of the failure is a statement about the unknown "
+    "start and nothing else."
 )
 
 
@@ -21,7 +22,8 @@ def claims(keep: Deck, fail: Deck, effort: Effort) -> list[Claim]:
 
 def _at(deck: Deck, time_s: float) -> Array:
     """Position errors (policies, seeds) at the kept instant next to a time, m."""
-    return deck.flights.position_error_m[int(np.abs(deck.flights.time_s - time_s).argmin())].astype(float)
+    place = int(np.abs(deck.flights.time_s - time_s).argmin())
+    return np.asarray(deck.flights.position_error_m[place], float)
 
 
 def _during(fail: Deck, effort: Effort) -> list[Claim]:
@@ -51,8 +53,8 @@ def _during(fail: Deck, effort: Effort) -> list[Claim]:
         "max |u| {} m/s^2",
         Between(high=8e-3),
         effort.assumption,
-        "The greatest thrust is the answer to the first measurement after the failure, and proportional to the drift. With "
-        "10 m and 0.02 m/s it holds, see the grid.",
+        "The greatest thrust is the answer to the first measurement after the failure, and proportional to the "
+        "drift. With 10 m and 0.02 m/s it holds, see the grid.",
     )
     return [
         growth.judge((_at(fail, FAILURE_S) - _at(fail, FAILURE_S / 2))[lqr]),
@@ -108,7 +110,8 @@ def _recovery(keep: Deck, fail: Deck, effort: Effort) -> list[Claim]:
         "the error is back within 50 m of the flight without failure {} s after the failure",
         Between(high=0.5 * fail.flights.scenario.orbit.period_s),
         f"{effort.assumption}; quick: within half a period",
-        "The estimate is right within a minute; the rest of the time is the law's, whose bandwidth the printed weight sets.",
+        "The estimate is right within a minute; the rest of the time is the law's, whose bandwidth the printed "
+        "weight sets.",
     )
     gentle = Statement(
         "5.2.2",
@@ -117,8 +120,8 @@ def _recovery(keep: Deck, fail: Deck, effort: Effort) -> list[Claim]:
         "max |u| of the first period is {} times that without failure",
         Between(high=1.1),
         effort.assumption,
-        "The law sees the whole drift at once and answers in proportion; the thesis's own Figure 5.12 has 8e-3 m/s^2 against "
-        "the 4e-3 m/s^2 of Figure 5.7.",
+        "The law sees the whole drift at once and answers in proportion; the thesis's own Figure 5.12 has 8e-3 "
+        "m/s^2 against the 4e-3 m/s^2 of Figure 5.7.",
     )
     ratio = fail.flights.max_accel(1)[lqr] / keep.flights.max_accel(1)[lqr]
     return [quick.judge(_settled_s(keep, fail, lqr)), gentle.judge(ratio)]

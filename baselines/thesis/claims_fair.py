@@ -1,10 +1,10 @@
 """The fair comparison: error-state LQR and sliding mode, both with the path's own thrust, both tuned the same way.
 
-Each law has two gains, searched over the same number of candidates on the tuning seeds for the least cost, delta-v plus a
-price times the mean error; the winners fly the test seeds. The truth is linear or not; filter and laws stay linear.
+Each law has two gains, searched over the same number of candidates on the tuning seeds for the least cost, delta-v plus
+a price times the mean error; the winners fly the test seeds. Filter and laws stay linear on any truth.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, Final
@@ -12,11 +12,10 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from baselines.policy import AccelerationPolicy
 from baselines.registry import make_policy
 from baselines.side_by_side import SideBySide
-from baselines.thesis import scenarios
-from baselines.thesis.claims_flights import PRINTED, Effort
+from baselines.thesis import plan, scenarios
+from baselines.thesis.claims_flights import Effort
 from formation_env.dynamics.base import Array
 from formation_env.evaluation import bootstrap_interval, evaluate
 from formation_env.scenario import Scenario
@@ -24,8 +23,9 @@ from formation_env.seeds import seeds
 
 PRICES: Final = (1e-3, 1e-2, 1e-1, 1.0)
 """Of the mean error, (m/s) per m."""
-TRUTHS: Final = ("modified_hcw", PRINTED, "nonlinear")
+LINEAR: Final = ("modified_hcw", plan.DYNAMICS)
 TUNING_SEEDS: Final = 12
+TUNING_STEP_S: Final = 30.0
 LAWS: Final = ("lqr", "smc")
 
 Gains = dict[str, Any]
@@ -72,38 +72,54 @@ def _smc(decay_per_s: float, q_per_s: float) -> Gains:
     }
 
 
-def keeping(truth: str, fails: bool, effort: Effort) -> Scenario:
-    """Section 5.2.2 on a truth, with or without failure; filter and laws believe the truth if it is linear."""
+def keeping(truth: str, fails: bool, effort: Effort, dt_s: float) -> Scenario:
+    """Section 5.2.2 on a truth, with or without failure; filter and laws believe a nonlinear one to be modified HCW."""
     make = scenarios.keeping_failure if fails else scenarios.keeping
-    scenario = effort.noise.on(make(effort.grid_periods, dt_s=effort.coarse_dt_s))
-    believed = "modified_hcw" if truth == "nonlinear" else truth
-    return replace(scenario, dynamics=truth, filter=replace(scenario.filter, dynamics=believed))
+    scenario = effort.noise.on(make(effort.grid_periods, dt_s=dt_s))
+    return replace(scenario, dynamics=truth)
 
 
-def compare(truth: str, fails: bool, effort: Effort) -> list[dict[str, str | float | bool]]:
-    """One line per price: the tuned laws' costs and the difference with its 95 % interval."""
-    scenario = keeping(truth, fails, effort)
-    tuned = {law: candidates(law, effort.candidates) for law in LAWS}
-    found = {law: outcome(_policies(law, tuned[law], scenario), scenario, seeds("tuning", TUNING_SEEDS)) for law in LAWS}
-    best = {law: [int(found[law].cost(price).mean(axis=1).argmin()) for price in PRICES] for law in LAWS}
-    flown = {
-        law: outcome(
-            _policies(law, [tuned[law][k] for k in best[law]], scenario), scenario, seeds("test", effort.seeds)
-        )
-        for law in LAWS
-    }
-    chosen = {law: [tuned[law][k] for k in best[law]] for law in LAWS}
-    return [
-        {"truth": truth, "failure": fails, **_line(index, price, flown, chosen)} for index, price in enumerate(PRICES)
-    ]
+@dataclass(frozen=True)
+class Comparison:
+    """Both laws on one truth, flown like a `Job`.
+
+    Attributes:
+        truth: name of the true dynamics.
+        fails: whether communication fails for the first 3000 s.
+        effort: how many candidates and seeds, and in what noise.
+    """
+
+    truth: str
+    fails: bool
+    effort: Effort
+
+    @property
+    def cost(self) -> int:
+        """How long it takes, in steps of one law."""
+        steps = keeping(self.truth, self.fails, self.effort, TUNING_STEP_S).num_steps
+        return 3 * len(LAWS) * self.effort.candidates**2 * steps
+
+    def fly(self, progress: Callable[[int], Any]) -> list[dict[str, Any]]:
+        """One line per price: the tuned laws' costs and the difference with its 95 % interval."""
+        chosen = {law: self._tuned(law) for law in LAWS}
+        progress(self.cost // 2)
+        scenario = keeping(self.truth, self.fails, self.effort, self.effort.coarse_dt_s)
+        flown = {law: outcome(law, chosen[law], scenario, seeds("test", self.effort.seeds)) for law in LAWS}
+        progress(self.cost - self.cost // 2)
+        said = {"truth": self.truth, "failure": self.fails}
+        return [said | _line(index, price, flown, chosen) for index, price in enumerate(PRICES)]
+
+    def _tuned(self, law: str) -> list[Gains]:
+        """The candidate of least cost on the tuning seeds, for each price."""
+        tried = candidates(law, self.effort.candidates)
+        scenario = keeping(self.truth, self.fails, self.effort, TUNING_STEP_S)
+        found = outcome(law, tried, scenario, seeds("tuning", TUNING_SEEDS))
+        return [tried[int(found.cost(price).mean(axis=1).argmin())] for price in PRICES]
 
 
-def _policies(law: str, gains: Sequence[Gains], scenario: Scenario) -> list[AccelerationPolicy]:
-    return [make_policy(law, scenario, one) for one in gains]
-
-
-def outcome(policies: Sequence[AccelerationPolicy], scenario: Scenario, episode_seeds: Sequence[int]) -> Outcome:
-    """Fly policies on the same seeds, side by side."""
+def outcome(law: str, gains: Sequence[Gains], scenario: Scenario, episode_seeds: Sequence[int]) -> Outcome:
+    """Fly a law with each of some gains on the same seeds, side by side."""
+    policies = [make_policy(law, scenario, one) for one in gains]
     table = evaluate(SideBySide(policies), scenario, [*episode_seeds] * len(policies))
     delta_v, error = (
         table[name].to_numpy(float).reshape(len(policies), -1) for name in ("delta_v_m_s", "position_error_mean_m")
@@ -127,16 +143,14 @@ def _line(index: int, price: float, flown: dict[str, Outcome], chosen: dict[str,
     return line
 
 
-def linear(effort: Effort) -> pd.DataFrame:
-    """The comparison on the linear truths."""
-    return _table(TRUTHS[:2], effort)
+def jobs(effort: Effort) -> dict[str, Comparison]:
+    """The comparison on each truth, with and without failure."""
+    return {
+        f"{truth} {'failure' if fails else 'no failure'}": Comparison(truth, fails, effort)
+        for truth, fails in product(effort.truths, (False, True))
+    }
 
 
-def nonlinear(effort: Effort) -> pd.DataFrame:
-    """The comparison on the nonlinear truth."""
-    return _table(TRUTHS[2:], effort)
-
-
-def _table(truths: Sequence[str], effort: Effort) -> pd.DataFrame:
-    lines = [line for truth, fails in product(truths, (False, True)) for line in compare(truth, fails, effort)]
-    return pd.DataFrame(lines)
+def table(flown: Mapping[str, list[dict[str, Any]]]) -> pd.DataFrame:
+    """One line per truth, failure and price."""
+    return pd.DataFrame([line for lines in flown.values() for line in lines])

@@ -1,15 +1,18 @@
 """The claims over the noise that the thesis is silent on: the same sentences at each level."""
 
 from collections import Counter
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from itertools import product
 from typing import Any, Final
 
 import pandas as pd
 
-from baselines.thesis import claims_failure, claims_flights, claims_keeping, claims_smc
+from baselines.thesis import claims_failure, claims_keeping, claims_smc
 from baselines.thesis.claim import Claim
-from baselines.thesis.claims_flights import Effort, Noise
+from baselines.thesis.claims_flights import Effort, Noise, keeper_decks, keepers
+from baselines.thesis.flights import Flights
+from baselines.thesis.jobs import Job
 
 SENSORS_M: Final = (0.02, 2.0, 20.0)
 PROCESSES_M_S2: Final = (0.0, 5e-6, 5e-5)
@@ -20,12 +23,25 @@ LEVELS: Final = tuple(
 )
 
 
-def grid(effort: Effort, levels: tuple[Noise, ...] = LEVELS) -> list[tuple[Noise, Claim]]:
-    """The claims of sections 5.2.2 and 5.2.3 at each level, from short flights with a longer step."""
+def jobs(effort: Effort) -> dict[str, Job]:
+    """Short flights with a longer step at each level."""
+    return {
+        f"{name} {index}": job
+        for index, noise in enumerate(LEVELS)
+        for name, job in keepers(_level(effort, noise)).items()
+    }
+
+
+def _level(effort: Effort, noise: Noise) -> Effort:
+    return replace(effort, dt_s=effort.grid_dt_s, periods=effort.grid_periods, noise=noise)
+
+
+def judge(flown: Mapping[str, Flights], effort: Effort) -> list[tuple[Noise, Claim]]:
+    """The claims of sections 5.2.2 and 5.2.3 at each level."""
     judged = []
-    for noise in levels:
-        level = replace(effort, dt_s=effort.grid_dt_s, periods=effort.grid_periods, noise=noise)
-        keep, fail = claims_flights.keeping(level), claims_flights.failure(level)
+    for index, noise in enumerate(LEVELS):
+        level = _level(effort, noise)
+        keep, fail = keeper_decks(flown[f"keep {index}"], flown[f"fail {index}"])
         claims = [
             *claims_keeping.at_one_noise(keep, level),
             *claims_failure.claims(keep, fail, level),

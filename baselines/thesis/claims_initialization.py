@@ -4,28 +4,25 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from baselines.thesis import scenarios
+from baselines.thesis import plan
 from baselines.thesis.claim import Claim
 from baselines.thesis.claims_flights import Effort
 from baselines.thesis.claims_verdict import Between, Statement
-from baselines.thesis.flights import Flights, fly
+from baselines.thesis.flights import Flights
+from baselines.transfers import two_impulse
+from formation_env.dynamics.base import DiscreteModel
 from formation_env.dynamics.hcw import transition_matrix
 
 HALF, TENTH = 0.5, 0.1
 _WHY_LAG = (
-    "The desired path has no velocity for the law to follow, which is the quasi-static tracker to the last digit, so the "
-    "follower lags by a constant distance while the line goes on."
+    "The desired path has no velocity for the law to follow, which is the quasi-static tracker to the last "
+    "digit, so the follower lags by a constant distance while the line goes on."
 )
 
 
-def initializations(effort: Effort) -> dict[float, Flights]:
-    """One noise-free flight for each transfer time in periods."""
-    flights = {}
-    for periods in scenarios.TRANSFER_PERIODS:
-        scenario = scenarios.initialization(periods, effort.dt_s)
-        tracker = scenarios.law("lqr_tracking", scenario, "thesis_initialization")
-        flights[periods] = fly([tracker], scenario, [0], guide="straight_line")
-    return flights
+def by_time(flown: Mapping[str, Flights]) -> dict[float, Flights]:
+    """The flights of `plan.initializations` by transfer time in periods."""
+    return {periods: flown[f"initialization {periods:g}"] for periods in plan.TRANSFER_PERIODS}
 
 
 def claims(flights: Mapping[float, Flights], effort: Effort) -> list[Claim]:
@@ -37,7 +34,14 @@ def claims(flights: Mapping[float, Flights], effort: Effort) -> list[Claim]:
 def _accuracies(flights: Mapping[float, Flights], assumption: str) -> list[Claim]:
     half, tenth = flights[HALF], flights[TENTH]
     rows = [
-        ("make the position error not greater than 30 m (t_f = 0.5 p)", "< 30 m", "max error {} m", 30.0, half, "error"),
+        (
+            "position error not greater than 30 m (t_f = 0.5 p)",
+            "< 30 m",
+            "max error {} m",
+            30.0,
+            half,
+            "error",
+        ),
         ("Figure 5.2: control acceleration, t_f = 0.5 p", "< 0.02 m/s^2", "max |u| {} m/s^2", 0.02, half, "accel"),
         ("Figure 5.3: position error, t_f = 0.1 p", "< 150 m", "max error {} m", 150.0, tenth, "error"),
         ("Figure 5.3: control acceleration, t_f = 0.1 p", "< 0.08 m/s^2", "max |u| {} m/s^2", 0.08, tenth, "accel"),
@@ -59,8 +63,8 @@ def _comparisons(flights: Mapping[float, Flights], assumption: str) -> list[Clai
         "delta-v at 0.1 p is {} times that at 0.5 p",
         Between(low=1.0),
         assumption,
-        "The line is gone along five times faster, and starting and stopping cost its speed twice; the Coriolis force costs "
-        "the same 2 n times 2000 m at any speed.",
+        "The line is gone along five times faster, and starting and stopping cost its speed twice; the Coriolis "
+        "force costs the same 2 n times 2000 m at any speed.",
     )
     accuracy = Statement(
         "5.2.1",
@@ -78,8 +82,8 @@ def _comparisons(flights: Mapping[float, Flights], assumption: str) -> list[Clai
         "largest |u_y| comes {} of the transfer time after the start",
         Between(high=0.1),
         assumption,
-        "The pulse is over when the follower moves as fast as the line; what remains is the x-axis thrust against the "
-        "Coriolis force.",
+        "The pulse is over when the follower moves as fast as the line; what remains is the x-axis thrust "
+        "against the Coriolis force.",
     )
     peak = int(np.abs(half.thrust_m_s2[:, 0, 0, 1]).argmax())
     return [
@@ -91,7 +95,7 @@ def _comparisons(flights: Mapping[float, Flights], assumption: str) -> list[Clai
 
 def _times(flights: Mapping[float, Flights], assumption: str) -> list[Claim]:
     times = sorted(flights)
-    cost = np.array([flights[t].delta_v()[0, 0] + 0.0 for t in times])
+    cost = np.array([flights[t].delta_v()[0, 0] for t in times])
     error = np.array([flights[t].max_error()[0, 0] for t in times])
     short = Statement(
         "5.2.1",
@@ -109,8 +113,8 @@ def _times(flights: Mapping[float, Flights], assumption: str) -> list[Claim]:
         "the transfer time of least delta-v and of least error is {} p",
         Between(low=0.2, high=0.8),
         f"{assumption}; 0.1 p to 1.4 p",
-        "Error and delta-v fall with the transfer time all the way, so the lower end is a matter of price and the upper end "
-        "is set by patience: nothing in the thesis's measures gets worse beyond 0.8 p.",
+        "Error and delta-v fall with the transfer time all the way, so the lower end is a matter of price and "
+        "the upper end is set by patience: nothing in the thesis's measures gets worse beyond 0.8 p.",
     )
     best = times[int(cost.argmin())] if cost.argmin() == error.argmin() else times[int(error.argmin())]
     first = np.array([cost[times.index(0.1)] - cost[times.index(0.2)]])
@@ -126,13 +130,10 @@ def _hohmann(half: Flights, assumption: str) -> Claim:
         "the line takes {} times the delta-v of two impulses in the same time",
         Between(low=0.9, high=1.1),
         assumption,
-        "A Hohmann transfer coasts between its impulses; on the line the follower thrusts against the Coriolis force all "
-        "the way, and in the inertial frame it only looks like an ellipse of the same duration.",
+        "A Hohmann transfer coasts between its impulses; on the line the follower thrusts against the Coriolis "
+        "force all the way, and in the inertial frame it only looks like an ellipse of the same duration.",
     )
-    n = half.scenario.orbit.mean_motion_rad_s
-    Phi = transition_matrix(n, half.time_s[-2])
-    # r_f = Phi_rv v_0 from rest at the leader; the second impulse takes what velocity is left
-    departure = np.linalg.solve(Phi[:3, 3:], half.desired[-1, :3])
-    arrival = Phi[3:, 3:] @ departure
-    impulses = np.linalg.norm(departure) + np.linalg.norm(arrival)
-    return statement.judge(half.delta_v()[0] / impulses)
+    time_s, n = float(half.time_s[-2]), half.scenario.orbit.mean_motion_rad_s
+    coast = DiscreteModel(transition_matrix(n, time_s), np.zeros((6, 3)), np.zeros(6))
+    impulses = two_impulse(coast, time_s, n, np.zeros(6), half.desired[-1])
+    return statement.judge(half.delta_v()[0] / impulses.delta_v_m_s)

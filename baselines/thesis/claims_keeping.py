@@ -4,8 +4,10 @@ import numpy as np
 
 from baselines.thesis import scenarios
 from baselines.thesis.claim import Claim
-from baselines.thesis.claims_flights import Deck, Effort, as_printed, deal, numbered
+from baselines.thesis.claims_flights import Deck, Effort, as_printed, deal, error_state
 from baselines.thesis.claims_verdict import Between, Statement
+from baselines.thesis.flights import Flights
+from baselines.thesis.jobs import Job
 from formation_env.dynamics.base import Array
 
 SWEEP_S2 = (500.0, 1000.0, 4150.0, 12000.0, 25000.0, 50000.0, 100000.0, 200000.0)
@@ -13,15 +15,22 @@ SWEEP_S2 = (500.0, 1000.0, 4150.0, 12000.0, 25000.0, 50000.0, 100000.0, 200000.0
 
 _WHY_PRINTED = (
     "The truth moves with k as eq. (2.62) prints it, 31 % faster across the plane than the desired circle of the "
-    "unperturbed HCW equations, and the law u = K (x_d - x) has to hold the difference of 2.96e-3 m/s^2 by an error; with "
-    "the n that the print lost, the same law errs by 0.2 m."
+    "unperturbed HCW equations, and the law u = K (x_d - x) has to hold the difference of 2.96e-3 m/s^2 by an "
+    "error; with the n that the print lost, the same law errs by 0.2 m."
 )
 
 
-def sweep(effort: Effort) -> Deck:
+LAWS = {f"{factor:g}": error_state(factor) for factor in SWEEP_S2}
+
+
+def sweep(effort: Effort) -> Job:
     """Figure 5.10: keeping with control weights of many sizes."""
-    scenario = as_printed(scenarios.keeping(effort.periods, effort.coarse_dt_s), effort)
-    return deal(numbered(SWEEP_S2), scenario, effort)
+    return deal(LAWS, as_printed(scenarios.keeping(effort.periods, effort.dt_s), effort), effort)
+
+
+def deck(swept: Flights) -> Deck:
+    """The sweep's flights by factor."""
+    return Deck(tuple(LAWS), swept)
 
 
 def claims(keep: Deck, swept: Deck, effort: Effort) -> list[Claim]:
@@ -56,8 +65,8 @@ def _figure_5_7(keep: Deck, effort: Effort) -> list[Claim]:
             "175 m for some R",
             "max error {} m with a = 4150",
             Between(165, 185),
-            "The error grows as the root of the control weight, since the disturbance is given; a third of the printed "
-            "weight does it.",
+            "The error grows as the root of the control weight, since the disturbance is given; a third of the "
+            "printed weight does it.",
         ).judge(flights.max_error()[keep.row("lqr_175")]),
     ]
 
@@ -89,8 +98,8 @@ def _consumption(keep: Deck, effort: Effort) -> list[Claim]:
         "delta-v {} m/s",
         Between(10, 40),
         effort.assumption,
-        "2.96e-3 m/s^2 of Figure 5.7 held for 10 periods is 109 m/s, whatever the law, so the figure's axis cannot be a "
-        "delta-v in m/s. Its label, m/s^2, says that samples of |u| were added up.",
+        "2.96e-3 m/s^2 of Figure 5.7 held for 10 periods is 109 m/s, whatever the law, so the figure's axis "
+        "cannot be a delta-v in m/s. Its label, m/s^2, says that samples of |u| were added up.",
     )
     samples = Statement(
         "5.2.2",
@@ -124,8 +133,8 @@ def _relation(swept: Deck, effort: Effort) -> list[Claim]:
         "delta-v per period in the last period is {} of that in the first, with max error below 100 m",
         Between(low=1.02),
         effort.assumption,
-        "Nothing accumulates: the filter bounds the estimate's error, so the cost per period is the same from the second "
-        "period on.",
+        "Nothing accumulates: the filter bounds the estimate's error, so the cost per period is the same from "
+        "the second period on.",
     )
     tight = swept.row("1000")
     flights = swept.flights

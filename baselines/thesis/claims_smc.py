@@ -10,8 +10,9 @@ SCALE_M = 4000.0
 """Size of the formation, of which section 5.2.3 gives accuracies in percent."""
 
 _WHY_FAIR = (
-    "The sliding mode law contains the thrust that the path itself takes (eq. 4.61), the LQR of the thesis does not: this is "
-    "the whole difference. With it, `lqr_feedforward`, the LQR has the sliding mode's delta-v and less error."
+    "The sliding mode law contains the thrust that the path itself takes (eq. 4.61), the LQR of the thesis does "
+    "not: this is the whole difference. With it, `lqr_feedforward`, the LQR has the sliding mode's delta-v and "
+    "less error."
 )
 
 
@@ -23,8 +24,8 @@ def claims(keep: Deck, fail: Deck, effort: Effort) -> list[Claim]:
 def _accuracy(keep: Deck, effort: Effort) -> list[Claim]:
     flights, smc = keep.flights, keep.row("smc")
     why = (
-        "With the exact model the law cancels the path's thrust, so only the unknown start remains, which decays at the "
-        "surface's rates 2e-5, 1e-4 and 1.6e-3 1/s: in 14, 3 and 0.2 hours."
+        "With the exact model the law cancels the path's thrust, so only the unknown start remains, which decays "
+        "at the surface's rates 2e-5, 1e-4 and 1.6e-3 1/s: in 14, 3 and 0.2 hours."
     )
 
     def say(sentence: str, said: str, quantity: str, wanted: Between) -> Statement:
@@ -52,8 +53,8 @@ def _without(keep: Deck, effort: Effort) -> list[Claim]:
         "SMC's delta-v minus that of the LQR with a = 1650 (70 m) {} m/s",
         Between(low=0.0),
         effort.assumption,
-        "At 70 m the LQR lets go of 3 % of the disturbance's thrust, the sliding mode of nothing; but the SMC's error is the "
-        "smaller one over ten periods, so the two are hardly at the same accuracy.",
+        "At 70 m the LQR lets go of 3 % of the disturbance's thrust, the sliding mode of nothing; but the SMC's "
+        "error is the smaller one over ten periods, so the two are hardly at the same accuracy.",
     )
     accuracy = Statement(
         "5.2.3",
@@ -76,8 +77,9 @@ def _design(effort: Effort) -> Claim:
         "",
         Between(),
         "what is easy is no measurement",
-        "The LQR has one number to turn in the thesis and the error follows it as its square root; the sliding mode has six, "
-        "and two of its surface's rates are slower than the orbit, so its printed values were hardly tuned.",
+        "The LQR has one number to turn in the thesis and the error follows it as its square root; the sliding "
+        "mode has six, and two of its surface's rates are slower than the orbit, so its printed values were "
+        "hardly tuned.",
     )
     return statement.undecided(f"1 gain against 6; see the fair comparison, {effort.candidates**2} candidates each")
 
@@ -120,8 +122,8 @@ def _with(fail: Deck, effort: Effort) -> list[Claim]:
             "LQR's error twice SMC's",
             "LQR's mean error is {} times SMC's",
             Between(1.5, 2.5),
-            "It holds where the start is known to 10 m and 0.02 m/s (see the grid) and turns round where it is known worse, "
-            "since the sliding mode's slow surface takes hours to undo the drift.",
+            "It holds where the start is known to 10 m and 0.02 m/s (see the grid) and turns round where it is "
+            "known worse, since the sliding mode's slow surface takes hours to undo the drift.",
         ).judge(error[lqr] / error[smc]),
         say(
             "more accuracy: 5 % of system scale",

@@ -63,12 +63,14 @@ class Statement:
         mean = float(values.mean())
         if len(values) == 1:
             return self._claim(self.quantity.format(f"{mean:.4g}"), None, None, self.wanted.verdict(mean, mean))
-        low, high = bootstrap_interval(values)
-        ours = (
-            f"{self.quantity.format(f'{mean:.4g} [{low:.4g}, {high:.4g}]')}; "
-            f"as said in {self.wanted.share(values)} of {len(values)} seeds"
+        return self.between(
+            mean, *bootstrap_interval(values), f"; as said in {self.wanted.share(values)} of {len(values)} seeds"
         )
-        return self._claim(ours, low, high, self.wanted.verdict(low, high))
+
+    def between(self, mean: float, low: float, high: float, more: str = "") -> Claim:
+        """The claim for a mean and its interval; `more` is added to the number."""
+        ours = self.quantity.format(f"{mean:.4g} [{low:.4g}, {high:.4g}]")
+        return self._claim(f"{ours}{more}", float(low), float(high), self.wanted.verdict(low, high))
 
     def undecided(self, ours: str) -> Claim:
         """The claim where no number can decide; the explanation says why."""

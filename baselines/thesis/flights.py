@@ -68,7 +68,8 @@ class Flights:
 
     def error_m(self, policy: int, seed: int = 0) -> Array:
         """Error vectors (instants, 3) of one of the first few seeds: desired minus true position, m, as in Ma 2009."""
-        return self.desired[:, :3] - self.truth[:, policy, seed, :3]
+        error: Array = self.desired[:, :3] - self.truth[:, policy, seed, :3].astype(float)
+        return error
 
     def index(self, periods: float) -> int:
         """Which kept instant is that many orbital periods after the start.
@@ -235,7 +236,8 @@ class _Log:
     def _distances(self, buffer: Array) -> Array:
         """Lengths (steps, policies, seeds) of the interval's vectors."""
         vectors = buffer[: self._filled]
-        return np.sqrt(np.einsum("sra,sra->sr", vectors, vectors)).reshape(-1, *self._shape)
+        lengths: Array = np.sqrt(np.einsum("sra,sra->sr", vectors, vectors))
+        return lengths.reshape(-1, *self._shape)
 
     def _first_few(self, values: Array) -> Array:
         """Values (policies, few, ...) of the first few seeds from (rows, ...)."""

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from dataclasses import dataclass
 from multiprocessing.sharedctypes import Synchronized
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 import numpy as np
 
@@ -83,8 +83,21 @@ class Job:
         )
 
 
-def run(jobs: Mapping[str, Job], progress: Callable[[int], Any], workers: int) -> dict[str, Flights]:
-    """Fly all jobs, the longest ones first.
+class Work(Protocol):
+    """A `Job`, or anything else that can be sent to another process and flown there."""
+
+    @property
+    def cost(self) -> int:
+        """How long it takes, in steps of one law."""
+        ...
+
+    def fly(self, progress: Callable[[int], Any]) -> Any:
+        """Fly it; progress is called with the cost of what was flown since the last call."""
+        ...
+
+
+def run(jobs: Mapping[str, Work], progress: Callable[[int], Any], workers: int) -> dict[str, Any]:
+    """Fly all jobs, the longest ones first, and give what each found.
 
     Args:
         jobs: by name.
@@ -131,7 +144,7 @@ def _begin(counter: "Synchronized[int]") -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def _fly(job: Job) -> Flights:
+def _fly(job: Work) -> Any:
     """Fly a job in a worker process."""
     counter = _counter
     assert counter is not None, "set by _begin"

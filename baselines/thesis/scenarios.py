@@ -18,7 +18,7 @@ from baselines.weights import Weights
 from formation_env.dropout import NoDropout
 from formation_env.dropout.windows import Window, Windows
 from formation_env.dynamics.base import Array
-from formation_env.formations import ProjectedCircle
+from formation_env.formations import Following, ProjectedCircle
 from formation_env.scenario import Phase, Scenario, config_folder, load_scenario
 
 ENTRY: Final = ProjectedCircle(x0_m=0.0, vx0_m_s=1.8)
@@ -88,7 +88,7 @@ def reconfiguration(
         dt_s: time step, s; the shipped scenario's if left out.
     """
     scenario = _shipped("thesis_reconfiguration", dt_s)
-    start = replace(scenario.start, formation=replace(scenario.start.formation, y0_m=y0_m))
+    start = replace(scenario.start, formation=Following(y0_m=y0_m))
     return replace(scenario, start=start, phases=(Phase(formation=entry, hold_periods=periods),))
 
 

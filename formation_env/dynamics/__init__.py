@@ -12,6 +12,7 @@ from formation_env.settings import nearest
 DYNAMICS: dict[str, type[Dynamics]] = {
     "hcw": HCW,
     "modified_hcw": ModifiedHCW,
+    "printed_hcw": PrintedHCW,
     "yamanaka_ankersen": YamanakaAnkersen,
     "printed_hcw": PrintedHCW,
 }

@@ -46,6 +46,17 @@ class DiscreteModel:
         parts = (self.Phi, self.Gamma, self.delta)
         return DiscreteModel(*(np.broadcast_to(part, (end - start, *part.shape)) for part in parts))
 
+    def from_start(self) -> "DiscreteModel":
+        """The model from the start of the first of its steps (count, ...) to each instant (count + 1, ...)."""
+        count = len(self.Phi)
+        Phi, Gamma = np.tile(np.eye(6), (count + 1, 1, 1)), np.zeros((count + 1, 6, 3))
+        delta = np.zeros((count + 1, 6))
+        for k in range(count):
+            Phi[k + 1] = self.Phi[k] @ Phi[k]
+            Gamma[k + 1] = self.Phi[k] @ Gamma[k] + self.Gamma[k]
+            delta[k + 1] = self.Phi[k] @ delta[k] + self.delta[k]
+        return DiscreteModel(Phi, Gamma, delta)
+
 
 class Dynamics(ABC):
     """A linear model x' = A(t) x + B u + d, whose orbit plane and cross-track motions are uncoupled.

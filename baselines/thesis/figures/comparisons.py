@@ -69,11 +69,12 @@ def against_transfer_time(flown: Mapping[float, Flights], color: str) -> Figure:
     return figure
 
 
-def trade(sweep: Sequence[tuple[Flights, int]], periods: Sequence[int]) -> Figure:
+def trade(flights: Flights, weights: Sequence[int], periods: Sequence[int]) -> Figure:
     """Consumption against accuracy over keeping times, means over the seeds.
 
     Args:
-        sweep: a point for each: flights and index of the policy.
+        flights: of all.
+        weights: indices of the policies; each is a point.
         periods: keeping times.
     """
     figure = style.sheet(4.6)
@@ -81,9 +82,9 @@ def trade(sweep: Sequence[tuple[Flights, int]], periods: Sequence[int]) -> Figur
     shades: Colormap = colormaps["viridis"]
     for index, time in enumerate(periods):
         color, marker = shades(index / len(periods)), "osD^"[index % 4]
-        spent = np.array([flights.delta_v(time)[policy].mean() for flights, policy in sweep])
+        spent = flights.delta_v(time)[weights].mean(axis=1)
         for quantity, dash, word in (("mean_error", "-", "mean"), ("max_error", ":", "max")):
-            error = np.array([getattr(flights, quantity)(time)[policy].mean() for flights, policy in sweep])
+            error = getattr(flights, quantity)(time)[weights].mean(axis=1)
             order = np.argsort(error)
             look: dict[str, Any] = {"color": color, "linestyle": dash, "marker": marker, "markersize": 4}
             axes.plot(error[order], spent[order], **look, label=f"t = {time} p, {word}")
@@ -132,7 +133,8 @@ def in_space(courses: Sequence[Course]) -> Figure:
             space.plot(course.periods, course.so_far(quantity), consumption, **look)
             errors.plot(course.periods, course.so_far(quantity), label=f"{course.label}, {word} value", **look)
         spent.plot(course.periods, consumption, color=course.color, marker=course.marker, markersize=4)
-    style.label(space, PERIODS, "Control accuracy [m]").set_zlabel(CONSUMPTION)
+    style.label(space, PERIODS, "Control accuracy [m]")
+    space.set_zlabel(CONSUMPTION)
     style.label(errors, PERIODS, "Control accuracy [m]")
     style.label(spent, PERIODS, CONSUMPTION)
     space.set_box_aspect((1.2, 1.2, 0.8), zoom=0.9)

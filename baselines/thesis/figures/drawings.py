@@ -16,6 +16,7 @@ Draw = Callable[[Flown], Figure]
 LQR, FINER, SMC = (plan.KEEPING.index(law) for law in (plan.LQR, plan.FINER, plan.SMC))
 FAILED_LQR, FAILED_SMC = (plan.FAILURE.index(law) for law in (plan.LQR, plan.SMC))
 MEANT_LQR, MEANT_TRACKING = (plan.MEANT.index(law) for law in (plan.LQR, plan.TRACKING))
+WEIGHTS = [plan.KEEPING.index(law) for law in plan.WEIGHTS]
 BLUE, RED, SKY = (style.COLORS[name] for name in ("lqr", "smc", "lqr_tracking"))
 
 
@@ -44,16 +45,12 @@ def one_path(name: str, policy: int, color: str) -> Draw:
     return lambda flown: paths.flight_path(flown[name], policy, color)
 
 
-def lqr_weights(flown: Flown) -> list[tuple[Flights, int]]:
-    """Flights and index of each LQR weight flown on the space circle."""
-    sweeps = [(flown[name], policy) for name in ("sweep 1", "sweep 2") for policy in range(len(plan.SWEEP_S2) // 2)]
-    return [*sweeps, (flown["keeping"], LQR), (flown["keeping"], FINER)]
-
-
 def weights(flown: Flown) -> Figure:
     """Consumption against accuracy of all LQR weights."""
     flown_periods = whole_periods(flown["keeping"].scenario)
-    return comparisons.trade(lqr_weights(flown), [time for time in plan.KEEPING_PERIODS if time in flown_periods])
+    return comparisons.trade(
+        flown["keeping"], WEIGHTS, [time for time in plan.KEEPING_PERIODS if time in flown_periods]
+    )
 
 
 def with_and_without_failure(flown: Flown) -> Figure:
@@ -66,16 +63,16 @@ def with_and_without_failure(flown: Flown) -> Figure:
     )
 
 
-def nearest_lqr(flown: Flown) -> Course:
-    """Of all LQR weights flown, the one whose mean error is nearest to SMC's."""
-    target = flown["keeping"].mean_error()[SMC].mean()
-    flights, policy = min(lqr_weights(flown), key=lambda found: abs(found[0].mean_error()[found[1]].mean() - target))
-    return Course("LQR of nearest mean accuracy", flights, policy, BLUE, "o")
+def nearest_lqr(keeping: Flights) -> Course:
+    """Of all LQR weights flown on the space circle, the one whose mean error is nearest to SMC's."""
+    means = keeping.mean_error().mean(axis=1)
+    policy = min(WEIGHTS, key=lambda index: abs(means[index] - means[SMC]))
+    return Course("LQR of nearest mean accuracy", keeping, policy, BLUE, "o")
 
 
 def lqr_and_smc(flown: Flown) -> Figure:
     """SMC beside an LQR of the same accuracy."""
-    return comparisons.in_space([nearest_lqr(flown), Course("SMC", flown["keeping"], SMC, RED, "s")])
+    return comparisons.in_space([nearest_lqr(flown["keeping"]), Course("SMC", flown["keeping"], SMC, RED, "s")])
 
 
 def lqr_and_smc_in_failure(flown: Flown) -> Figure:

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Final
 
+import numpy as np
+
 from baselines.report.results import number
 from baselines.thesis import plan
 from baselines.thesis.figures.drawings import (
@@ -72,7 +74,14 @@ def _transfer_times(flown: Flown) -> str:
 
 
 def _estimation(flown: Flown) -> str:
-    return NO_MEASUREMENTS + "Cross-track the follower stays behind the desired path, which Figure 5.7 explains."
+    keeping = flown["keeping"]
+    after = keeping.time_s > keeping.scenario.orbit.period_s
+    misses = np.linalg.norm((keeping.estimate - keeping.truth)[after, LQR, 0, :3], axis=-1)
+    return (
+        f"After the first period the estimate's position is wrong by {number(float(np.sqrt((misses**2).mean())))} m "
+        f"(root mean square). {NO_MEASUREMENTS}Cross-track the follower stays behind the desired path, which Figure "
+        "5.7 explains."
+    )
 
 
 def _keeping(flown: Flown) -> str:
@@ -169,7 +178,8 @@ def _start(name: str, what: str) -> Callable[[Flown], str]:
 
 
 def _velocity(values: tuple[float, ...]) -> str:
-    return f"The thesis does not print the velocities; here it starts with {values} m/s."
+    words = ", ".join(f"{value:g}" for value in values)
+    return f"The thesis does not print the velocities; here it starts with [{words}] m/s."
 
 
 def _mission(flown: Flown) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -43,7 +44,7 @@ def four_panels(lines: Sequence[Line]) -> Figure:
     first = lines[0]
     time_s, scored = first.flights.time_s, flown(first.flights)
     _vector(grid[0, 0], time_s[scored], first.flights.error_m(first.policy)[scored])
-    _vector(grid[1, 0], time_s[1:], first.flights.thrust_m_s2[1:, first.policy, 0])
+    _vector(grid[1, 0], time_s[1:], np.asarray(first.flights.thrust_m_s2[1:, first.policy, 0], float))
     style.label(grid[0, 0], TIME, ERROR)
     style.label(grid[1, 0], TIME, ACCEL)
     for line in reversed(lines):  # the first one on top
@@ -66,7 +67,7 @@ def _both_legends(figure: Figure, vectors: Axes, magnitudes: Axes) -> None:
     handles, labels = vectors.get_legend_handles_labels()
     more, names = magnitudes.get_legend_handles_labels()
     handles, labels = [*handles, *reversed(more)], [*labels, *reversed(names)]
-    figure.legend(handles, labels, loc="outside upper center", ncols=min(4, len(labels)))
+    figure.legend(handles, labels, loc="outside upper center", ncols=min(5, len(labels)))
 
 
 def flown(flights: Flights) -> slice:

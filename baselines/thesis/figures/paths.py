@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from baselines.thesis.figures import style
 from baselines.thesis.flights import Flights
 from formation_env.dynamics.base import Array
+from formation_env.schedule import legs
 
 MARGIN: Final = 1.08
 
@@ -45,7 +46,8 @@ def phase_paths(flights: Flights, policy: int, pieces: list[tuple[str, float, fl
 def _paths(axes: Any, flights: Flights, policy: int, piece: slice, color: str) -> None:
     """A piece of a flight, where it begins, where it should, and the leader."""
     true, desired = flights.truth[piece, policy, 0, :3], flights.desired[piece, :3]
-    axes.plot(*desired.T, color=style.DESIRED, lw=2.6, label="desired trajectory")
+    jumps = np.searchsorted(flights.steps[piece], [leg.start + 1 for leg in legs(flights.scenario)[1:]])
+    axes.plot(*np.insert(desired, jumps, np.nan, axis=0).T, color=style.DESIRED, lw=2.6, label="desired trajectory")
     axes.plot(*true.T, color=color, lw=1.2, label="true trajectory")
     point(axes, true[0], "o", color, "follower's start")
     point(axes, desired[0], "s", style.DESIRED, "desired start")

@@ -92,7 +92,7 @@ FIGURES: Final[dict[str, Figure]] = {
     ),
     "5.7": Figure(
         "Control accuracy and consumption",
-        "LQR controller parameters: Q = diag([1 1 1 1 1 1]), R = diag([1/n² 1/n² 1/n²]) ∗ a (a = 12000) to make the "
+        "LQR controller parameters: Q = diag([1 1 1 1 1 1]), R = diag([1/n⁻² 1/n² 1/n²] ∗ a) (a = 12000) to make the "
         "position error < 300m. […] control effort in z-axis is dominant which coincides the relative motion with the "
         "direction perpendicular to the reference orbit plane.",
         drawings.keeping,

@@ -19,7 +19,7 @@ COLORS: Final = {name: look.color for name, look in looks(("lqr", "lqr_tracking"
 DESIRED: Final = NEUTRAL
 PLANNED: Final = "#333333"
 START: Final = "#E69F00"
-_SETTINGS: Final = {
+_SETTINGS: Final[Any] = {
     "svg.hashsalt": "formation-env",  # equal figures are equal files
     "font.size": 9.0,
     "axes.grid": True,
@@ -42,11 +42,10 @@ def sheet(height_in: float) -> Figure:
     return Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
 
 
-def label(axes: Axes, x: str, y: str) -> Axes:
+def label(axes: Axes, x: str, y: str) -> None:
     """Name quantity and unit of both axes."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)
-    return axes
 
 
 def legend(figure: Figure, axes: Axes, columns: int = 4) -> None:
