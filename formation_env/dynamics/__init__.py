@@ -14,7 +14,6 @@ DYNAMICS: dict[str, type[Dynamics]] = {
     "modified_hcw": ModifiedHCW,
     "printed_hcw": PrintedHCW,
     "yamanaka_ankersen": YamanakaAnkersen,
-    "printed_hcw": PrintedHCW,
 }
 
 NONLINEAR: Final = "nonlinear"
