@@ -13,13 +13,20 @@ import pandas as pd
 from formation_env.envs import ENV_IDS
 
 RIVALS: Final = ("CartPole-v1", "Pendulum-v1")
+VARIANTS: Final = {"keeping_nonlinear": "FormationKeeping-v0"}
+"""Scenarios that are measured beside the ids' own, and the id that flies them."""
 _ROUNDS: Final = 5
 _ACTIONS: Final = 64
 
 
 def single_stepper(env_id: str, steps: int) -> Callable[[], int]:
-    """A function that takes some steps in one environment made with `gymnasium.make`; it returns how many."""
-    env: gymnasium.Env[Any, Any] = gymnasium.make(env_id)
+    """A function that takes some steps in one environment made with `gymnasium.make`; it returns how many.
+
+    Args:
+        env_id: an id, or one of `VARIANTS`.
+        steps: how many each call takes.
+    """
+    env: gymnasium.Env[Any, Any] = gymnasium.make(VARIANTS.get(env_id, env_id), **_scenario(env_id))
     env.reset(seed=0)
     env.action_space.seed(0)
     actions = itertools.cycle([env.action_space.sample() for _ in range(_ACTIONS)])
@@ -36,7 +43,8 @@ def single_stepper(env_id: str, steps: int) -> Callable[[], int]:
 
 def batch_stepper(env_id: str, rows: int, steps: int) -> Callable[[], int]:
     """The same for the batched environment; a step of all rows counts as many."""
-    env = gymnasium.make_vec(env_id, rows, vectorization_mode="vector_entry_point")
+    kind = VARIANTS.get(env_id, env_id)
+    env = gymnasium.make_vec(kind, rows, vectorization_mode="vector_entry_point", **_scenario(env_id))
     env.reset(seed=0)
     env.action_space.seed(0)
     actions = itertools.cycle([env.action_space.sample() for _ in range(_ACTIONS)])
@@ -47,6 +55,11 @@ def batch_stepper(env_id: str, rows: int, steps: int) -> Callable[[], int]:
         return steps * rows
 
     return run
+
+
+def _scenario(env_id: str) -> dict[str, Any]:
+    """Arguments of a variant's environment."""
+    return {"scenario": env_id} if env_id in VARIANTS else {}
 
 
 def rates(steppers: dict[str, Callable[[], int]], rounds: int = _ROUNDS) -> dict[str, float]:
@@ -77,8 +90,8 @@ def table(rows: int) -> pd.DataFrame:
 
     The actions are random, and the steps span whole episodes, so resets have their share.
     """
-    singles = rates({env_id: single_stepper(env_id, 3000) for env_id in (*ENV_IDS, *RIVALS)})
-    batches = rates({env_id: batch_stepper(env_id, rows, 400) for env_id in (*ENV_IDS, RIVALS[0])}, rounds=3)
+    singles = rates({env_id: single_stepper(env_id, 3000) for env_id in (*ENV_IDS, *VARIANTS, *RIVALS)})
+    batches = rates({env_id: batch_stepper(env_id, rows, 400) for env_id in (*ENV_IDS, *VARIANTS, RIVALS[0])}, rounds=3)
     lines = [
         {"faces": faces, "env": env_id, "steps_per_s": rate, "x_cartpole": rate / group[RIVALS[0]]}
         for faces, group in (("single", singles), (f"batch of {rows}", batches))

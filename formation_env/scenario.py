@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import fields, replace
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Literal, Self
@@ -249,12 +250,23 @@ class Scenario:
         return self._model(belief.dynamics, belief.orbit, belief.spacecraft, leader)
 
     def _model(self, name: str, orbit: Orbit, spacecraft: Spacecraft, leader: Spacecraft) -> DiscreteModel:
-        dynamics = get_dynamics(name)
-        starts_s = 0.0 if dynamics.time_invariant else self.dt_s * np.arange(self.num_steps)
-        return dynamics.discretise(starts_s, self.dt_s, orbit, spacecraft, leader)
+        steps = 0 if get_dynamics(name).time_invariant else self.num_steps
+        return _discrete_model(name, self.dt_s, steps, orbit, spacecraft, leader)
 
 
 MAX_STEPS = 1_000_000
+
+
+@lru_cache(maxsize=64)
+def _discrete_model(
+    name: str, dt_s: float, steps: int, orbit: Orbit, spacecraft: Spacecraft, leader: Spacecraft
+) -> DiscreteModel:
+    """A linear model over one step, or if steps > 0 over each of them; its arrays are shared, so read-only."""
+    starts_s = dt_s * np.arange(steps) if steps else 0.0
+    model = get_dynamics(name).discretise(starts_s, dt_s, orbit, spacecraft, leader)
+    for part in (model.Phi, model.Gamma, model.delta):
+        part.setflags(write=False)
+    return model
 
 
 def config_folder(name: str) -> Path:

@@ -10,6 +10,7 @@ LVLH is the frame that truly rotates with the leader, at omega = [r a_h / h, 0, 
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -167,6 +168,7 @@ def substeps(dt_s: float) -> int:
     return int(np.ceil(dt_s / MAX_SUBSTEP_S))
 
 
+@lru_cache(maxsize=4)
 def leader_table(world: World, craft: Spacecraft, dt_s: float, num_steps: int) -> Array:
     """What the compiled step needs to know of the leader, one row for each step (num_steps, width).
 
@@ -184,4 +186,6 @@ def leader_table(world: World, craft: Spacecraft, dt_s: float, num_steps: int) -
     per_step = len(NODES) * count
     rows = np.lib.stride_tricks.sliding_window_view(nodes, per_step + 1, axis=0)[::per_step]
     turning = leader.rotation[::per_step, [0, 2]]
-    return np.hstack([rows.transpose(0, 2, 1).reshape(num_steps, -1), turning[:-1], turning[1:]])
+    table = np.hstack([rows.transpose(0, 2, 1).reshape(num_steps, -1), turning[:-1], turning[1:]])
+    table.setflags(write=False)
+    return table
