@@ -101,8 +101,8 @@ def _figures(numbers: Found) -> list[tuple[str, str, Figure]]:
         (
             "Cost in closed loop, linear and nonlinear",
             "Means and 95 % intervals; right, of the differences on the same seeds. Gains are those of the scenario's "
-            "file, keeping_eccentric's those of keeping. Filter and laws believe modified HCW, about an ellipse Yamanaka "
-            "and Ankersen's model, unless it says otherwise.",
+            "file, keeping_eccentric's those of keeping. Filter and laws believe modified HCW, in keeping_eccentric "
+            "Yamanaka and Ankersen's model, unless it says otherwise.",
             figures.costs(numbers.costs),
         ),
     ]
