@@ -62,15 +62,16 @@ def reproduce(
         float, typer.Option(min=0.1, max=60.0, help="Time step, s; a coarse one for a quick look.")
     ] = 1.0,
     claims: Annotated[bool, typer.Option(help="Judge the claims, too.")] = True,
+    models: Annotated[bool, typer.Option(help="Hold the linear models against the nonlinear truth, too.")] = True,
     processes: Annotated[int, typer.Option(min=1, help="To fly in.")] = min(2, os.cpu_count() or 1),
 ) -> None:
-    """Redraw the thesis's figures, judge its claims, and write both, and one HTML page of all."""
+    """Redraw the thesis's figures, judge its claims and its models, and write all of it, with one HTML page."""
     command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
 
     def write() -> Path:
         from baselines.thesis.report import Wanted, write_thesis
 
-        return write_thesis(out, Wanted(episodes, step_s, claims=claims), command, processes)
+        return write_thesis(out, Wanted(episodes, step_s, claims=claims, models=models), command, processes)
 
     _run("reproduce", out, write)
 

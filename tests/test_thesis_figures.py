@@ -231,7 +231,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, flown: dict[str, Flights]) 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(report, "fly", lambda wanted, workers: flown)
         patch.setattr(claims, "tables", lambda flown, effort: TABLES)
-        page = report.write_thesis(out, report.Wanted(2, COARSE_S, 2.3), "the <command>", 1)
+        page = report.write_thesis(out, report.Wanted(2, COARSE_S, 2.3, models=False), "the <command>", 1)
     assert page == out / report.PAGE
     return out
 

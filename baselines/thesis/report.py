@@ -1,6 +1,6 @@
 """From flights to files: the figures one by one, the page that holds them all, and the claims as tables."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -8,7 +8,7 @@ from typing import Any, Final
 from tqdm import tqdm
 
 from baselines.report.document import versions
-from baselines.thesis import claims, jobs, plan, tables
+from baselines.thesis import claims, jobs, plan, report_models, tables
 from baselines.thesis.claims_flights import Effort
 from baselines.thesis.figures import FIGURES, Figure, style
 from baselines.thesis.flights import Flights
@@ -37,12 +37,14 @@ class Wanted:
         step_s: time step of the figures and of the main claims, s.
         periods: keeping time, in periods of the orbit.
         claims: whether the claims are judged, too; their noise grid and their fair comparison take longest.
+        models: whether the linear models are held against the nonlinear truth, too.
     """
 
     episodes: int = 50
     step_s: float = 1.0
     periods: float = 10.0
     claims: bool = True
+    models: bool = True
 
     @property
     def effort(self) -> Effort:
@@ -52,7 +54,7 @@ class Wanted:
         return Effort(seeds=self.episodes, dt_s=dt_s, coarse_dt_s=coarse_dt_s, grid_dt_s=grid_dt_s)
 
 
-def write_thesis(out: Path, wanted: Wanted, command: str, workers: int, model_errors: Sequence[Picture] = ()) -> Path:
+def write_thesis(out: Path, wanted: Wanted, command: str, workers: int) -> Path:
     """Fly what the thesis flew, and write figures, claims and the page; files appear only when all are complete.
 
     Args:
@@ -60,7 +62,6 @@ def write_thesis(out: Path, wanted: Wanted, command: str, workers: int, model_er
         wanted: what to reproduce.
         command: the command line that redoes it; noted on the page.
         workers: processes to fly in.
-        model_errors: figures of what the linear world hides.
 
     Returns:
         Path of the HTML page.
@@ -73,12 +74,16 @@ def write_thesis(out: Path, wanted: Wanted, command: str, workers: int, model_er
     work: dict[str, Work] = dict(plan.jobs(seeds("test", wanted.episodes), wanted.step_s, wanted.periods))
     if wanted.claims:
         work |= claims.jobs(wanted.effort)
+    if wanted.models:
+        work |= report_models.jobs(seeds("test", wanted.episodes))
     flown = fly(work, workers)
     contents: dict[str, bytes] = {}
     with style.settings():
         bar = tqdm(FIGURES.items(), desc="drawing", unit="figure", dynamic_ncols=True)
         pictures = [_draw(number, figure, flown, contents) for number, figure in bar]
-    content = Content(pictures, model_errors=model_errors)
+        content = Content(pictures)
+        if wanted.models:
+            content = report_models.shown(content, report_models.found(flown), contents)
     if wanted.claims:
         content = judged(content, claims.tables(flown, wanted.effort), contents)
     facts = {"episodes": wanted.episodes, "step_s": f"{wanted.step_s:g}", "command": command, "versions": versions()}

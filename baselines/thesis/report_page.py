@@ -19,7 +19,7 @@ class Picture:
     """A figure as it stands on the page.
 
     Attributes:
-        number: of the figure in the thesis; empty if it is not in it.
+        number: of the figure in the thesis, or one of its own, M.1 and so on; empty if it has none.
         title: what it shows.
         sentence: of the thesis, beside the figure; empty if there is none.
         note: what came out.
@@ -45,7 +45,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Table:
-    """A table that stands below the claims.
+    """A table as it stands on the page.
 
     Attributes:
         name: of its file.
@@ -83,12 +83,16 @@ class Content:
         claims: lines of the claims table.
         tables: what stands below the claims.
         model_errors: figures of what the linear world hides.
+        lessons: sentences above them.
+        guide: which model is good enough; stands below the sentences.
     """
 
     pictures: Sequence[Picture]
     claims: Sequence[Claim] = ()
     tables: Sequence[Table] = ()
     model_errors: Sequence[Picture] = ()
+    lessons: Sequence[str] = ()
+    guide: Table | None = None
 
 
 def render(content: Content, facts: dict[str, Any]) -> str:
@@ -108,6 +112,8 @@ def render(content: Content, facts: dict[str, Any]) -> str:
         claims=content.claims,
         tables=content.tables,
         model_errors=content.model_errors,
+        lessons=content.lessons,
+        guide=content.guide,
         verdicts=[(verdict, counts[verdict]) for verdict in get_args(Verdict)],
         facts=facts,
     )
