@@ -112,6 +112,20 @@ def test_what_is_kept_changes_no_sum(flown: Mapping[str, Flights]) -> None:
         every[1].index(0.123)
 
 
+def test_measurements_are_the_sensors(flown: Mapping[str, Flights]) -> None:
+    """Kept measurements scatter about the truth as the sensor says, and there are none while the link is closed.
+
+    A standard deviation of n numbers scatters by 1 / sqrt(2 n), with n > 400 below 4 %; 5 of these.
+    """
+    flights = flown["failure"]
+    measured = ~np.isnan(flights.measurement[..., 0])
+    np.testing.assert_array_equal(measured[:, 0, 0], ~flights.scenario.dropout.closed(flights.time_s))
+    error = (flights.measurement - flights.truth)[measured]
+    assert error[:, :3].std() == pytest.approx(2.0, rel=0.2)
+    assert error[:, 3:].std() == pytest.approx(0.02, rel=0.2)
+    assert np.isnan(flown["mission"].measurement).all()
+
+
 def test_axes_bound_the_magnitude(flown: Mapping[str, Flights]) -> None:
     """Delta-v of the axes: at least the vector's together, at most sqrt(3) times it (norms of R^3)."""
     for flights in flown.values():
