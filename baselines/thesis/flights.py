@@ -18,8 +18,8 @@ from formation_env.schedule import leg_reference, legs
 
 Floats = NDArray[np.float32]
 
-TRUSTLESS_M_S2: Final = 1e6
-"""Process noise, and spread of the start, so large that a filter takes each measurement for the truth."""
+TRUSTLESS_M_S2: Final = 100.0
+"""Process noise, and spread of the start in SI units, so large that a filter takes each measurement for the truth."""
 
 FEW: Final = 1
 """Seeds of each policy whose whole states are kept, unless another number is asked for."""
