@@ -18,8 +18,8 @@ from formation_env.schedule import leg_reference, legs
 
 Floats = NDArray[np.float32]
 
-TRUSTLESS_M_S2: Final = 100.0
-"""Process noise, and spread of the start in SI units, so large that a filter takes each measurement for the truth."""
+_SEES: Final = {"process_noise_m_s2": 1.0, "sigma_pos_m": 1e-6, "sigma_vel_m_s": 1e6}
+"""Beliefs of a filter that takes each measured position for the truth, and nothing else."""
 
 FEW: Final = 1
 """Seeds of each policy whose whole states are kept, unless another number is asked for."""
@@ -47,8 +47,8 @@ class Flights:
         truth: true states (instants, policies, first few seeds, 6), m and m/s.
         estimate: estimated states, the same shape.
         thrust_m_s2: accelerations over the steps to the instants (instants, policies, first few seeds, 3).
-        measurement: measured states (instants, policies, first few seeds, 6), NaN where none arrived; all NaN if they
-            were not asked for.
+        measurement: measured positions (instants, policies, first few seeds, 3), m; NaN where none arrived, and all
+            NaN if they were not asked for.
     """
 
     scenario: Scenario
@@ -202,16 +202,16 @@ class _Witness:
     """Sees the measurements: it flies the same episodes with a filter that trusts nothing else, and gives its estimate.
 
     Attributes:
-        seen: the last measured states (policies, few, 6), NaN where none arrived.
+        seen: the last measured positions (policies, few, 3), m; NaN where none arrived.
     """
 
     def __init__(
         self, scenario: Scenario, policies: int, seeds: Sequence[int], options: dict[str, Array] | None
     ) -> None:
-        believed = replace(scenario.filter, process_noise_m_s2=TRUSTLESS_M_S2, initial_sigma_pos_m=TRUSTLESS_M_S2)
-        believed = replace(believed, initial_sigma_vel_m_s=TRUSTLESS_M_S2)
         self._shape = (policies, len(seeds))
-        self._env = FormationVectorEnv(policies * len(seeds), replace(scenario, filter=believed))
+        self._env = FormationVectorEnv(
+            policies * len(seeds), replace(scenario, filter=replace(scenario.filter, **_SEES))
+        )
         self._look(self._env.reset(seed=[*seeds] * policies, options=options)[1])
 
     def step(self, actions: Floats) -> None:
@@ -222,8 +222,8 @@ class _Witness:
         self._look(_with_finals(infos) if (terminations | truncations).any() else infos)
 
     def _look(self, infos: dict[str, Any]) -> None:
-        seen = np.where(infos["measured"][:, None], infos["estimate"], np.nan)
-        self.seen = seen.reshape(*self._shape, 6)
+        seen = np.where(infos["measured"][:, None], infos["estimate"][:, :3], np.nan)
+        self.seen = seen.reshape(*self._shape, 3)
 
 
 class _Log:
@@ -243,7 +243,7 @@ class _Log:
         self._sums, self._effort = np.empty((2, count, *shape)), np.empty((count, *shape, 3))
         self._states = np.empty((2, count, shape[0], few, 6), np.float32)
         self._few_thrusts = np.empty((count, shape[0], few, 3), np.float32)
-        self._measurements = np.full((count, shape[0], few, 6), np.nan, np.float32)
+        self._measurements = np.full((count, shape[0], few, 3), np.nan, np.float32)
 
     def add(
         self, infos: dict[str, Any], going: NDArray[np.bool_] | None = None, measurement: Array | None = None
