@@ -98,9 +98,7 @@ class LQR(AccelerationPolicy):
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
         now = self._guidance.track(observation)
-        feedback = -(self.K[now.phase, now.steps_left] @ now.error[..., None])[..., 0]
-        acceleration: Array = feedback + self._own_thrust[now.phase, now.steps_left]
-        return acceleration
+        return self._own_thrust[now.at] - (self.K[now.at] @ now.error[..., None])[..., 0]
 
 
 def phase_gains(scenario: Scenario, leg: Leg, gains: LQRSettings) -> Array:

@@ -20,7 +20,7 @@ from baselines.registry import make_policy
 from baselines.thesis import claims, jobs, plan, report, scenarios, tables
 from baselines.thesis.claim import Claim
 from baselines.thesis.figures import FIGURES, drawings, orbits, style
-from baselines.thesis.flights import Flights, desired_states, fly
+from baselines.thesis.flights import Flights, desired_path, fly
 from baselines.thesis.report_page import Content, Picture, render
 from formation_env import load_scenario
 from formation_env.constants import OMEGA_EARTH, R_EARTH
@@ -55,7 +55,7 @@ def test_scenarios_start_where_the_thesis_prints() -> None:
     keeping, reconfiguration = scenarios.keeping(), scenarios.reconfiguration()
     start = keeping.start.formation.state(keeping.orbit)
     np.testing.assert_allclose(start, PRINTED_START, atol=0.05)
-    entry = desired_states(reconfiguration, "automatic")[0]
+    entry = desired_path(reconfiguration, "automatic")[0]
     np.testing.assert_allclose(entry, [0, 3324, 0, 1.8, 0, 3.6], atol=0.5)
     np.testing.assert_array_equal(scenarios.with_velocity(reconfiguration, (1, 2, 3)), [0, 5000, 0, 1, 2, 3])
 

@@ -7,14 +7,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.guidance import Guide, desired_path
+from baselines.guidance import Guide, desired_states
 from baselines.side_by_side import SideBySide
 from formation_env.dynamics.base import Array
 from formation_env.envs import interface
 from formation_env.envs.vector import FormationVectorEnv
 from formation_env.evaluation import Policy
 from formation_env.scenario import Scenario
-from formation_env.schedule import leg_reference, legs
+from formation_env.schedule import legs
 
 Floats = NDArray[np.float32]
 
@@ -175,16 +175,12 @@ def whole_periods(scenario: Scenario) -> list[int]:
     return [time for time in range(1, longest + 1) if scenario.steps(time) <= scenario.num_steps]
 
 
-def desired_states(scenario: Scenario, guide: Guide) -> Array:
+def desired_path(scenario: Scenario, guide: Guide) -> Array:
     """The desired path (num_steps + 1, 6): each leg's from its beginning, the end of a leg being its own."""
     states = np.empty((scenario.num_steps + 1, 6))
     for leg in legs(scenario):
         first = leg.start + 1 if leg.index else 0
-        path = desired_path(scenario, leg, guide)
-        steps = np.arange(leg.start, leg.end + 1)
-        whole = leg_reference(scenario, leg, steps)
-        whole[: len(path)] = path
-        states[first : leg.end + 1] = whole[first - leg.start :]
+        states[first : leg.end + 1] = desired_states(scenario, leg, guide)[first - leg.start :]
     return states
 
 
@@ -235,7 +231,7 @@ class _Log:
         count = len(steps)
         longest = int(np.diff(steps, prepend=-1).max())
         self._scenario, self._steps, self._shape, self._few = scenario, steps, shape, few
-        self._path = desired_states(scenario, guide)
+        self._path = desired_path(scenario, guide)
         self._step = self._place = self._filled = 0
         self._positions = np.empty((longest, shape[0] * shape[1], 3))
         self._thrusts = np.empty_like(self._positions)
