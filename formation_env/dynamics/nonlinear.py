@@ -176,7 +176,7 @@ def substeps(dt_s: float) -> int:
 def leader_table(world: World, craft: Spacecraft, dt_s: float, num_steps: int) -> Array:
     """What the compiled step needs to know of the leader, one row for each step (num_steps, width).
 
-    A row has the leader at `NODES` of each substep and at the end, with `FIELDS` (and `FAR_FIELDS`) at each; then LVLH's
+    A row has the leader at `NODES` of each substep and at the end, `FIELDS` (and `FAR_FIELDS`) at each; then LVLH's
     angular velocity about x and z at the step's start and at its end.
     """
     count = substeps(dt_s)
