@@ -2,7 +2,8 @@
 
 The dual problem has six unknowns: lambda, the adjoint state at the arrival, with lambda.d greatest as long as the
 primer vector's length is nowhere above 1 (Lawden 1963; Neustadt 1964, "Optimization, a moment problem, and nonlinear
-programming"). Any thrust u(t) that covers the miss d spends at least that: lambda.d = integral of p.u <= integral of |u|.
+programming"). Any thrust u(t) that covers the miss d spends at least that:
+lambda.d = integral of p.u <= integral of |u|.
 
 Legend: lambda adjoint state at the arrival, p primer vector, Phi_k transition matrix from an instant to the arrival.
 """
@@ -15,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from baselines.fuel.program import TOLERANCE
-from baselines.timeline import nominal_start
+from baselines.fuel.cones import solve_cones
+from baselines.fuel.problem import start_of
 from formation_env.dynamics import DiscreteModel, get_dynamics
 from formation_env.dynamics.base import Array
 from formation_env.evaluation import scenario_of
@@ -67,9 +68,7 @@ def impulsive_transfer(
     leg = _transfer(scenario, phase)
     if instants < 2:
         raise ValueError(f"instants: must be at least 2, got {instants}")
-    start = nominal_start(scenario, leg) if initial_state is None else np.asarray(initial_state, float)
-    if start.shape != (6,) or not np.isfinite(start).all():
-        raise ValueError(f"initial_state: must be finite with shape (6,), got shape {start.shape}: {start}")
+    start = start_of(scenario, leg, initial_state)
     times_s = scenario.dt_s * np.linspace(leg.start, leg.arrival, instants)
     whole = _to_arrival(scenario, times_s)
     miss = leg_reference(scenario, leg, np.array(leg.arrival)) - (whole.Phi[0] @ start + whole.delta[0])
@@ -103,21 +102,10 @@ def _solve(effects: Array, miss: Array) -> tuple[Array, Array]:
         effects: of each impulse on the arrival (instants, 6, 3).
         miss: what they must add up to (6,), m and m/s.
     """
-    import clarabel
-
     count = len(effects)
     # maximise lambda.d with (1, effect' lambda) in the cone, at each instant; the multipliers are the impulses
     primer = np.zeros((count, 4, 6))
     primer[:, 1:] = -(effects / _UNITS[:, None]).transpose(0, 2, 1)
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-    result = clarabel.DefaultSolver(
-        sparse.csc_array((6, 6)),
-        -miss / _UNITS,
-        sparse.csc_array(primer.reshape(-1, 6)),
-        np.tile(np.eye(4)[0], count),
-        [clarabel.SecondOrderConeT(4)] * count,
-        settings,
-    ).solve()
-    return np.array(result.x) / _UNITS, -np.array(result.z).reshape(count, 4)[:, 1:]
+    A, b = sparse.csc_array(primer.reshape(-1, 6)), np.tile(np.eye(4)[0], count)
+    adjoint, multipliers = solve_cones(sparse.csc_array((6, 6)), -miss / _UNITS, A, b, 0, 0, count)
+    return adjoint / _UNITS, -multipliers.reshape(count, 4)[:, 1:]

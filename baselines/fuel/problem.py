@@ -15,7 +15,7 @@ from formation_env.dynamics.base import Array
 from formation_env.envs import FormationEnv
 from formation_env.envs.interface import INFO_THRUST
 from formation_env.scenario import Limits, Scenario
-from formation_env.schedule import FIELDS, OFFSETS, build_schedule, leg_reference, legs
+from formation_env.schedule import FIELDS, OFFSETS, Leg, build_schedule, leg_reference, legs
 
 _FAR_M: Final = 1e9
 """A distance limit that no episode reaches."""
@@ -71,13 +71,12 @@ def episode_problem(
     Raises:
         ValueError: a nonlinear truth, both a seed and a state, a state of wrong shape, or no transfer to arrive from.
     """
-    if scenario.dynamics == NONLINEAR:
-        raise ValueError(f"dynamics: the fuel optimum needs a linear truth, got {NONLINEAR!r}")
+    start = start_of(scenario, legs(scenario)[0], initial_state)
     if seed is not None and initial_state is not None:
         raise ValueError(f"initial_state: give it or a seed, not both; got seed = {seed}")
     model, limit = scenario.true_model().steps(0, scenario.num_steps), scenario.spacecraft.max_accel_m_s2
     if seed is None:
-        free_path, gains = _coast(scenario, initial_state), np.ones(scenario.num_steps)
+        free_path, gains = _coast(scenario, start), np.ones(scenario.num_steps)
     else:
         free_path, gains = _episode(scenario, seed)
     schedule, shape = build_schedule(scenario), scenario.reward.shape
@@ -101,14 +100,22 @@ def episode_problem(
     )
 
 
-def _coast(scenario: Scenario, initial_state: ArrayLike | None) -> Array:
-    """States (steps + 1, 6) without thrust and noise."""
-    if initial_state is None:
-        start = nominal_start(scenario, legs(scenario)[0])
-    else:
-        start = np.asarray(initial_state, float)
+def start_of(scenario: Scenario, leg: Leg, initial_state: ArrayLike | None) -> Array:
+    """The state (6,) given to start a phase at; the nominal one without it.
+
+    Raises:
+        ValueError: a nonlinear truth, or a state of wrong shape or not finite.
+    """
+    if scenario.dynamics == NONLINEAR:
+        raise ValueError(f"dynamics: the fuel optimum needs a linear truth, got {NONLINEAR!r}")
+    start = nominal_start(scenario, leg) if initial_state is None else np.asarray(initial_state, float)
     if start.shape != (6,) or not np.isfinite(start).all():
         raise ValueError(f"initial_state: must be finite with shape (6,), got shape {start.shape}: {start}")
+    return start
+
+
+def _coast(scenario: Scenario, start: Array) -> Array:
+    """States (steps + 1, 6) without thrust and noise."""
     path = scenario.true_model().steps(0, scenario.num_steps).from_start()
     return np.asarray(path.Phi @ start + path.delta)
 

@@ -1,4 +1,4 @@
-"""The fuel optimum as a second-order cone program for Clarabel (Goulart & Chen 2024, arXiv 2405.12762).
+"""The fuel optimum as a second-order cone program.
 
 The variables are what the thrust adds to the state after each step, the thrust, its length, and the length of the
 position error at each judged instant; a step couples neighbours only, so the program is sparse and its solution takes a
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from baselines.fuel.cones import UnreachableError, solve_cones
 from baselines.fuel.problem import Problem
 from formation_env.dynamics.base import Array
 
@@ -19,9 +20,6 @@ LENGTH_M: Final = 1000.0
 """Unit of positions in the program."""
 RATE_PER_S: Final = 1e-3
 """Unit of velocities in it, over that of positions; about a mean motion."""
-TOLERANCE: Final = 1e-9
-"""Relative, of the solver's residuals and its gap."""
-
 _UNITS: Final = LENGTH_M * np.repeat([1.0, RATE_PER_S], 3)
 _LENGTH: Final = np.eye(4, 1)
 _VECTOR: Final = np.eye(4, 3, -1)
@@ -55,26 +53,20 @@ def solve(problem: Problem) -> Solution:
 
     Raises:
         ValueError: no thrust within the limit meets the states to be met.
-        ModuleNotFoundError: Clarabel is not installed; it comes with the extra `optimal`.
+        ModuleNotFoundError: Clarabel is not installed.
     """
-    import clarabel
-
-    steps, judged = len(problem.Phi), len(_coned(problem))
     rows = [_motion(problem), _meeting(problem), _box(problem), _thrusts(problem), _errors(problem)]
-    cones = [clarabel.ZeroConeT(len(rows[0].b) + len(rows[1].b)), clarabel.NonnegativeConeT(len(rows[2].b))]
-    cones += [clarabel.SecondOrderConeT(4)] * (steps + judged)
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
     P, cost = _objective(problem)
     A, b = sparse.vstack([part.A for part in rows], format="csc"), np.concatenate([part.b for part in rows])
-    result = clarabel.DefaultSolver(P, cost, A, b, cones, settings).solve()
-    if "PrimalInfeasible" in str(result.status):
+    sizes = [len(part.b) for part in rows]
+    try:
+        x, z = solve_cones(P, cost, A, b, sizes[0] + sizes[1], sizes[2], (sizes[3] + sizes[4]) // 4)
+    except UnreachableError as error:
         raise ValueError(
             f"exact_arrival: no thrust of at most {problem.limit.max():g} m/s^2 along each axis meets the reference at "
             f"the steps {list(problem.met)}"
-        )
-    return _read(problem, np.array(result.x), np.array(result.z))
+        ) from error
+    return _read(problem, x, z)
 
 
 def _coned(problem: Problem) -> IntArray:
