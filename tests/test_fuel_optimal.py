@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from oracles import MU
+from oracles import MU, hcw_state_matrix
 from scipy import sparse
 from scipy.linalg import expm
 from scipy.optimize import linprog
@@ -21,7 +21,8 @@ from formation_env.orbit import Orbit
 from formation_env.scenario import Scenario
 from formation_env.schedule import leg_reference, legs
 
-START = np.array([30.0, -40.0, 25.0, 0.02, -0.01, 0.03])
+START = np.array([30.0, -40.0, 0.0, 0.02, -0.01, 0.0])
+"""Somewhere in the orbit plane: two impulses half a period apart cannot change the place along its normal."""
 
 
 def vary(name: str, **changes: float | str) -> Scenario:
@@ -56,8 +57,7 @@ def forced_positions(steps: int, dt_s: float) -> Array:
     """What each thrust does to each later position (steps, 3, steps, 3), by the exponential of a matrix of its own."""
     n = float(np.sqrt(MU / Orbit().radius_m ** 3))
     generator = np.zeros((9, 9))
-    generator[:3, 3:6] = generator[3:6, 6:] = np.eye(3)
-    generator[3, 0], generator[3, 4], generator[4, 3], generator[5, 2] = 3 * n**2, 2 * n, -2 * n, -(n**2)
+    generator[:6, :6], generator[3:6, 6:] = hcw_state_matrix(n), np.eye(3)
     effects = np.zeros((steps, 3, steps, 3))
     once, coast = expm(generator * dt_s)[:6, 6:], expm(generator[:6, :6] * dt_s)
     for age in range(steps):
@@ -160,22 +160,22 @@ def unit(vectors: Array) -> Array:
 
 @pytest.mark.parametrize(("name", "limit"), [("initialization", 0.002), ("initialization", 0.05), ("keeping", 0.002)])
 def test_linear_programs_bracket_the_bound(name: str, limit: float) -> None:
-    """Cones inside and outside of the true ones, solved by HiGHS: 206 directions are 2 % apart at most.
+    """Cones inside and outside of the true ones, solved by HiGHS: 106 directions are 4 % apart at most.
 
-    Then the outer ones get the directions of the thrusts and errors that it found itself, five times (Kelley 1960):
+    Then the outer ones get the directions of the thrusts and errors that it found itself, four times (Kelley 1960):
     what its thrust truly costs, and its value, close in on the optimum to 0.1 %. The smaller limit is at work.
     """
     scenario = with_phase(
-        vary(name, dynamics="hcw", dt_s=150.0, max_accel_m_s2=limit, process_noise_m_s2=5e-5), hold_periods=0.5
+        vary(name, dynamics="hcw", dt_s=200.0, max_accel_m_s2=limit, process_noise_m_s2=5e-5), hold_periods=0.3
     )
     plan, program = fuel_optimal(scenario, seed=5), polyhedral(scenario, 5)
-    steps, judged, around = scenario.num_steps, len(program.price), sphere(200)
+    steps, judged, around = scenario.num_steps, len(program.price), sphere(100)
     thrust_cuts, error_cuts = np.tile(around, (steps, 1, 1)), np.tile(around, (judged, 1, 1))
     assert program.cost(plan.controls) == pytest.approx(plan.cost, rel=1e-6)
-    assert plan.cost <= program.inner(around) <= 1.02 * plan.cost
+    assert plan.cost <= program.inner(around) <= 1.04 * plan.cost
     below, thrust = program.outer(thrust_cuts, error_cuts)
-    assert 0.98 * plan.cost <= below <= plan.cost
-    for _ in range(5):
+    assert 0.96 * plan.cost <= below <= plan.cost
+    for _ in range(4):
         error = (program.miss + program.effects @ thrust.ravel()).reshape(-1, 3)
         thrust_cuts = np.concatenate([thrust_cuts, unit(thrust)[:, None]], axis=1)
         error_cuts = np.concatenate([error_cuts, unit(error)[:, None]], axis=1)
@@ -189,19 +189,24 @@ def test_linear_programs_bracket_the_bound(name: str, limit: float) -> None:
 # --- closed forms
 
 
-@pytest.mark.parametrize(("periods", "share"), [(0.5, np.pi), (1.0, 2 / 3), (2.0, 1 / 3)])
-def test_impulses_shift_along_track_as_hill_has_it(periods: float, share: float) -> None:
+@pytest.mark.parametrize(("periods", "share", "saves"), [(0.5, np.pi, 0), (1.0, 2 / 3, 2e-3), (2.0, 1 / 3, 1e-3)])
+def test_impulses_shift_along_track_as_hill_has_it(periods: float, share: float, saves: float) -> None:
     """By HCW, eq. (3.2-3.3): y0' = -dy / (3 t) after whole periods, x0' = -n dy / 4 after a half; twice, to stop there.
 
     So delta-v is 2 dy / (3 t) and n dy / 2 = pi dy / p; here times p / dy. What finds it knows nothing of that, and
-    proves that no other thrust does better.
+    proves that no other thrust does better. After whole periods two impulses are not quite the best: burns shortly
+    after the start and before the end save a per mille.
     """
     scenario = with_phase(vary("initialization", dynamics="hcw", dt_s=Orbit().period_s / 200), transfer_periods=periods)
     plan = impulsive_transfer(scenario)
     expected = share * 2000 / Orbit().period_s
-    assert plan.delta_v_m_s == pytest.approx(expected, rel=1e-6)
+    assert (1 - saves - 1e-6) * expected < plan.delta_v_m_s < (1 - 0.3 * saves + 1e-6) * expected
     assert abs(plan.gap) < 1e-6 * expected
-    assert np.linalg.norm(plan.impulses_m_s, axis=1).sum() == pytest.approx(plan.delta_v_m_s)
+    path, n = np.zeros(6), scenario.orbit.mean_motion_rad_s
+    for impulse, coast_s in zip(plan.impulses_m_s, np.append(np.diff(plan.times_s), 0), strict=True):
+        path[3:] += impulse
+        path = expm(hcw_state_matrix(n) * coast_s) @ path
+    np.testing.assert_allclose(path, [0, 2000, 0, 0, 0, 0], atol=1e-3)  # the solver's 1e-9, over hours
 
 
 def test_a_fine_grid_without_limit_comes_to_the_two_impulses() -> None:

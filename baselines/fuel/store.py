@@ -1,6 +1,7 @@
 """Solutions on disk: one file for each episode and each choice of settings."""
 
 import hashlib
+import io
 from pathlib import Path
 from zipfile import BadZipFile
 
@@ -37,7 +38,8 @@ def write(path: Path, solution: Solution) -> None:
 def read(path: Path, steps: int) -> Solution | None:
     """The solution of an episode of that many steps; None if there is none, or the file is not a whole one."""
     try:
-        with np.load(path, allow_pickle=False) as arrays:
+        # from memory: of a broken archive numpy leaves the file open
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as arrays:
             solution = Solution(arrays["controls"], arrays["multipliers"])
     except (OSError, ValueError, KeyError, EOFError, TypeError, BadZipFile):
         return None
