@@ -8,7 +8,7 @@ import pytest
 
 import baselines.fuel.optimum
 from baselines import OptimalPlan, fuel_optimal, regret
-from baselines.fuel.certificate import _least
+from baselines.fuel.certificate import least_of_steps
 from formation_env import load_scenario
 from formation_env.scenario import Scenario
 
@@ -93,7 +93,7 @@ def test_least_thrust_of_a_step_is_the_least_on_a_grid() -> None:
     u = u[np.abs(u).max(axis=1) == 1]
     for q in [*rng.normal(size=(30, 3)), np.array([1.0, 0, 0]), np.array([0.8, 0.8, 0.0]), np.zeros(3)]:
         tried = min(0.0, float((dt_s * np.linalg.norm(u, axis=1) + u @ q).min()))
-        assert tried - 1e-3 * dt_s <= float(_least(q, dt_s)) <= tried + 1e-12
+        assert tried - 1e-3 * dt_s <= float(least_of_steps(q, dt_s)) <= tried + 1e-12
 
 
 def test_regret_is_cost_over_bound() -> None:

@@ -45,7 +45,7 @@ def lower_bound(problem: Problem, multipliers: Array) -> float:
     for k in range(len(problem.Phi) - 1, -1, -1):
         adjoint = y[k + 1] + (problem.Phi[k + 1].T @ adjoint if k + 1 < len(problem.Phi) else 0)
         q[k] = problem.Gamma[k].T @ adjoint
-    return float((y * problem.miss).sum() - conjugate + (problem.limit * _least(q, problem.dt_s)).sum())
+    return float((y * problem.miss).sum() - conjugate + (problem.limit * least_of_steps(q, problem.dt_s)).sum())
 
 
 def _feasible(problem: Problem, multipliers: Array) -> tuple[Array, float]:
@@ -65,7 +65,7 @@ def _feasible(problem: Problem, multipliers: Array) -> tuple[Array, float]:
     return y, conjugate
 
 
-def _least(q: Array, dt_s: float) -> Array:
+def least_of_steps(q: Array, dt_s: float) -> Array:
     """Least of |u| dt + q.u over the cube |u_i| <= 1 for each q (..., 3).
 
     It is minus the distance from q to the ball of radius dt in the 1-norm: of the points of the ball, the one with
@@ -77,4 +77,4 @@ def _least(q: Array, dt_s: float) -> Array:
     levels = np.sqrt(np.maximum(rest, 0) / np.array([3, 2, 1]))
     fits = size >= levels
     level = np.where(fits.any(axis=-1), np.take_along_axis(levels, fits.argmax(axis=-1)[..., None], -1)[..., 0], np.inf)
-    return -np.maximum(size - level[..., None], 0).sum(axis=-1)
+    return np.asarray(-np.maximum(size - level[..., None], 0).sum(axis=-1))

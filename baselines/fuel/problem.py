@@ -74,28 +74,23 @@ def episode_problem(
     start = start_of(scenario, legs(scenario)[0], initial_state)
     if seed is not None and initial_state is not None:
         raise ValueError(f"initial_state: give it or a seed, not both; got seed = {seed}")
-    model, limit = scenario.true_model().steps(0, scenario.num_steps), scenario.spacecraft.max_accel_m_s2
+    model, shape = scenario.true_model().steps(0, scenario.num_steps), scenario.reward.shape
     if seed is None:
         free_path, gains = _coast(scenario, start), np.ones(scenario.num_steps)
     else:
         free_path, gains = _episode(scenario, seed)
-    schedule, shape = build_schedule(scenario), scenario.reward.shape
-    goal = np.zeros_like(free_path)
-    first = OFFSETS["scored_position"]
-    goal[:, :3] = schedule[:, first : first + FIELDS["scored_position"]]
-    price, met = schedule[:, OFFSETS["error_price"]].copy(), ()
-    if exact_arrival:
-        price[:], met = 0, _meet(scenario, goal)
+    goal, price = _scores(scenario)
+    met = _meet(scenario, goal) if exact_arrival else ()
     return Problem(
         dt_s=scenario.dt_s,
         Phi=model.Phi,
         Gamma=model.Gamma,
         free_path=free_path,
         goal=goal,
-        price=price,
+        price=0 * price if exact_arrival else price,
         linear=float(shape == "linear"),
         quadratic=float(shape == "quadratic") / scenario.reward.quadratic_scale_m,
-        limit=limit * np.abs(gains),
+        limit=scenario.spacecraft.max_accel_m_s2 * np.abs(gains),
         met=met,
     )
 
@@ -137,6 +132,14 @@ def _fly(env: FormationEnv, seed: int, action: float) -> tuple[Array, Array]:
     infos = [env.reset(seed=seed)[1]]
     infos += [env.step(np.full(3, action, np.float32))[4] for _ in range(env.scenario.num_steps)]
     return np.array([info["true_state"] for info in infos]), np.array([info[INFO_THRUST] for info in infos[1:]])
+
+
+def _scores(scenario: Scenario) -> tuple[Array, Array]:
+    """What each instant is judged by: a state (steps + 1, 6), of which only the position counts, and the price."""
+    schedule, first = build_schedule(scenario), OFFSETS["scored_position"]
+    goal = np.zeros((len(schedule), 6))
+    goal[:, :3] = schedule[:, first : first + FIELDS["scored_position"]]
+    return goal, schedule[:, OFFSETS["error_price"]].copy()
 
 
 def _meet(scenario: Scenario, goal: Array) -> tuple[int, ...]:
