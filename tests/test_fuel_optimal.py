@@ -11,6 +11,7 @@ from scipy.linalg import expm
 from baselines import fuel_optimal, impulsive_transfer, make_policy
 from baselines.fuel.certificate import lower_bound
 from baselines.fuel.problem import episode_problem
+from baselines.fuel.program import solve
 from baselines.transfers import two_impulse
 from formation_env import FormationEnv, load_scenario
 from formation_env.dynamics import HCW
@@ -67,6 +68,20 @@ def test_a_fine_grid_without_limit_comes_to_the_two_impulses() -> None:
     assert impulses < costs[1] < costs[0] < 1.03 * impulses
     assert costs[1] - (costs[0] - costs[1]) / 2 == pytest.approx(impulses, rel=3e-4)
     assert impulsive_transfer(scenario, initial_state=START).delta_v_m_s == pytest.approx(impulses, rel=1e-6)
+
+
+def test_the_gap_of_few_instants_covers_what_more_would_save() -> None:
+    """Reconfiguration's best has an impulse on the way; where it may not be, the gap tells. Least by 2000 instants.
+
+    The primer vector is looked at eight times as finely, so that the bound is too high by 1e-6 at most here.
+    """
+    fine = impulsive_transfer("reconfiguration", instants=2000)
+    assert abs(fine.gap) < 1e-6
+    for instants in (2, 4, 8, 16):
+        plan = impulsive_transfer("reconfiguration", instants=instants)
+        assert plan.delta_v_m_s > fine.delta_v_m_s
+        assert plan.delta_v_m_s - plan.gap < fine.delta_v_m_s * (1 + 1e-6)
+    assert impulsive_transfer("reconfiguration", instants=2).gap > 1e-3
 
 
 def test_exact_arrival_of_initialization_costs_about_one_metre_per_second() -> None:
@@ -163,13 +178,18 @@ def test_nothing_near_the_plan_is_cheaper() -> None:
 
 @pytest.mark.parametrize("shape", ["linear", "quadratic"])
 def test_any_multipliers_give_a_lower_bound(shape: str) -> None:
-    """Weak duality holds for whatever the multipliers are: the certificate need not trust the solver."""
+    """Weak duality holds for whatever the multipliers are: the certificate need not trust the solver.
+
+    Random ones of many sizes, some towards the goal; and those of a dearer problem, which are too long for this one.
+    """
     scenario, rng = vary("initialization", shape=shape), np.random.default_rng(1)
     problem, cost = episode_problem(scenario, 2), fuel_optimal(scenario, seed=2).cost
     for size in np.geomspace(1e-7, 1e-1, 20):
         multipliers = size * rng.normal(size=(scenario.num_steps + 1, 6))
         multipliers += size * np.concatenate([-problem.goal[:, :3], np.zeros_like(multipliers[:, 3:])], axis=1) / 2000
         assert lower_bound(problem, multipliers) <= cost
+    dearer = episode_problem(vary("initialization", shape=shape, error_weight=0.02), 2)
+    assert lower_bound(problem, solve(dearer).multipliers) <= cost < lower_bound(dearer, solve(dearer).multipliers)
 
 
 def test_more_thrust_and_a_smaller_price_cost_less() -> None:
