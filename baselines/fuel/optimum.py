@@ -67,23 +67,29 @@ def fuel_optimal(
         ValueError: a nonlinear truth, both a seed and a state, a state of wrong shape, no transfer to arrive from, or
             an arrival out of the thruster's reach.
         RuntimeError: the solver failed.
+        OSError: the folder cannot be written.
         ModuleNotFoundError: Clarabel is not installed; it comes with the extra `optimal`.
     """
     scenario = scenario_of(scenario)
     problem = episode_problem(scenario, seed, initial_state, exact_arrival)
-    path = None if cache_folder is None else store.path_of(cache_folder, scenario, seed, initial_state, exact_arrival)
-    if path is not None and (kept := store.read(path, len(problem.Phi))) is not None:
-        # What was kept is judged on today's problem, so that nothing stale passes.
-        plan = _judge(problem, kept)
-        if _is_optimal(plan):
-            return plan
+    if cache_folder is None:
+        return _solve(problem)[0]
+    path = store.path_of(cache_folder, scenario, seed, initial_state, exact_arrival)
+    kept = store.read(path, len(problem.Phi))
+    # What was kept is judged on today's problem, so that nothing stale passes.
+    if kept is not None and _is_optimal(plan := _judge(problem, kept)):
+        return plan
+    plan, solution = _solve(problem)
+    store.write(path, solution)
+    return plan
+
+
+def _solve(problem: Problem) -> tuple[OptimalPlan, Solution]:
     solution = solve(problem)
     plan = _judge(problem, solution)
     if not _is_optimal(plan):
         raise RuntimeError(f"fuel_optimal: the solver left a gap of {plan.gap:.3g} m/s, above {LARGEST_GAP_M_S:g} m/s")
-    if path is not None:
-        store.write(path, solution)
-    return plan
+    return plan, solution
 
 
 def _judge(problem: Problem, solution: Solution) -> OptimalPlan:
