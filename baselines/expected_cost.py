@@ -170,3 +170,19 @@ def _steepness(scenario: Scenario, error_m: Array) -> Array:
     if scenario.reward.shape == "quadratic":
         return np.full(error_m.shape, 1 / scenario.reward.quadratic_scale_m)
     return 1 / (error_m + ERROR_FLOOR_M)
+
+
+def episode_scatter(scenario: Scenario) -> tuple[Array, Array]:
+    """How far an episode scatters about its mean under `expected_cost_gains`.
+
+    Returns:
+        Root mean squares of the true position error (num_steps + 1,), m, and of the acceleration (num_steps,), m/s^2.
+    """
+    known = knowledge(scenario, scenario.filter_model())
+    first, error, control = known.learned[0], np.zeros(scenario.num_steps + 1), np.zeros(scenario.num_steps)
+    for leg, gains in zip(legs(scenario), expected_cost_gains(scenario), strict=True):
+        instants = slice(leg.start, leg.end + 1)
+        here = Knowledge(known.missed[instants], known.learned[instants])
+        seen = spread(scenario.filter_model().steps(leg.start, leg.end), gains, np.zeros(6), first, here)
+        error[instants], control[leg.start : leg.end], first = seen.error, seen.control, seen.last
+    return error, control

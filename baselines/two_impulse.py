@@ -1,0 +1,62 @@
+"""Transfers by two impulses, planned anew from the estimate; keeping by a deadband."""
+
+import numpy as np
+
+from baselines.guidance import Guidance
+from baselines.keeping import Keeping, KeepingSettings
+from baselines.mid_course import CorrectionSettings, MidCourse
+from baselines.policy import AccelerationPolicy, Observations
+from formation_env.dynamics.base import Array
+from formation_env.scenario import Scenario
+from formation_env.schedule import observation_layout
+from formation_env.settings import NonNegative, settings
+
+
+@settings
+class TwoImpulseSettings:
+    """Settings of `two_impulse`.
+
+    Attributes:
+        correction: when the first impulse is given, and corrected on the way.
+        braking: share of the second impulse's burn that lies before the arrival.
+        keeping: the hold's deadband.
+    """
+
+    correction: CorrectionSettings = CorrectionSettings()
+    braking: NonNegative = 0.5
+    keeping: KeepingSettings = KeepingSettings()
+
+
+class TwoImpulsePolicy(AccelerationPolicy):
+    """In a transfer the impulse that leads to the goal, later the one that stops there; each as a burn at the limit.
+
+    It has no plan in memory: the estimate tells what the arrival would be like, so what an impulse is still to do.
+    """
+
+    Settings = TwoImpulseSettings
+
+    def __init__(self, scenario: Scenario, gains: TwoImpulseSettings) -> None:
+        super().__init__(scenario)
+        self.gains = gains
+        self._layout = observation_layout(scenario)
+        self._guidance = Guidance(scenario, "automatic")
+        self._course = MidCourse(scenario, gains.correction)
+        self._keeping = Keeping(scenario, gains.keeping)
+
+    def acceleration(self, observation: Observations) -> Array:
+        """Accelerations (..., 3), m/s^2, along the wanted impulse even at the limit."""
+        now = self._guidance.track(observation)
+        at = (now.phase, now.steps_left)
+        arrival = self._layout.state(observation, "arrival_error")
+        first = self._course.impulse(arrival[..., :3], *at)
+        off = self._course.is_off(arrival[..., :3], observation, *at)
+        brakes = self._layout.time_to_arrival_s(observation) <= self.gains.braking * self._burn_s(-arrival[..., 3:])
+        transfer = np.where(brakes[..., None], -arrival[..., 3:], np.where(off[..., None], first, 0.0))
+        wanted = transfer / self.scenario.dt_s
+        kept = self._keeping.acceleration(now.error, *at)
+        return self.within_limit(np.where(now.in_hold[..., None], kept, wanted))
+
+    def _burn_s(self, impulse_m_s: Array) -> Array:
+        """How long the burns (...) of impulses (..., 3) last, s."""
+        longest: Array = np.abs(impulse_m_s).max(axis=-1) / self._max_accel_m_s2
+        return longest
