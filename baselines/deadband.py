@@ -11,7 +11,7 @@ from baselines.policy import AccelerationPolicy, Observations
 from baselines.timeline import by_steps_left
 from formation_env.dynamics.base import Array
 from formation_env.scenario import Scenario
-from formation_env.settings import settings
+from formation_env.settings import NonNegative, settings
 
 
 @settings
@@ -20,11 +20,13 @@ class DeadbandSettings:
 
     Attributes:
         guidance: the transfers' path, see `baselines.guidance`.
+        least_thrust: thrust of the path below this share of the limit is left out; corrections make up for it.
         correction: when the follower is brought back to it.
         keeping: the hold's deadband.
     """
 
     guidance: Literal["least_fuel", "two_impulse"] = "least_fuel"
+    least_thrust: NonNegative = 0.02
     correction: CorrectionSettings = CorrectionSettings()
     keeping: KeepingSettings = KeepingSettings()
 
@@ -42,7 +44,9 @@ class Deadband(AccelerationPolicy):
         self._keeping = Keeping(scenario, gains.keeping)
         model = scenario.filter_model()
         to_accel = by_steps_left(scenario, lambda leg: np.linalg.pinv(model.steps(leg.start, leg.end).Gamma))
-        self._own_thrust = (to_accel @ self._guidance.residuals[..., None])[..., 0]
+        own = (to_accel @ self._guidance.residuals[..., None])[..., 0]
+        least = gains.least_thrust * scenario.spacecraft.max_accel_m_s2
+        self._own_thrust = np.where(np.linalg.norm(own, axis=-1, keepdims=True) >= least, own, 0.0)
 
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""

@@ -23,7 +23,7 @@ class LQRFiniteSettings:
 
 
 class LQRFinite(LQR):
-    """A gain for each step to the arrival, of the least squares of thrust and arrival error (Ma 2009, eq. 4.12-4.14)."""
+    """A gain for each step to the arrival: least squares of thrust and of the last error (Ma 2009, eq. 4.12-4.14)."""
 
     Settings = LQRFiniteSettings
 

@@ -1,15 +1,12 @@
-"""Model predictive control: at each step the plan of least cost from the estimate on, of which the first thrust is given.
+"""Model predictive control: at each step the plan of least cost from the estimate on; its first thrust is given.
 
 A plan looks ahead through the schedule, across arrivals and changes of phase, to a given hold time from now; as the end
 of the episode comes near, its horizon shrinks. It knows that errors and thrust will scatter about it: by how much
 `baselines.expected_cost` says. Without that, each new estimate's noise would be answered by a thrust.
 """
 
-from typing import Annotated
-
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, Strict
 
 from baselines.blocks import block_ends, horizon_end, shared_prices
 from baselines.cone_program import ConeProgram, Horizon, Plan
@@ -33,7 +30,6 @@ class MPCSettings:
         finest_periods: length of a plan's first blocks of constant thrust, in orbital periods; at least a step.
         coarsest_periods: length of its last blocks; if shorter than the first, all are as long as the first.
         growth: length of a block over its time from now, between the two.
-        hold_every: in a hold a plan is made every so many steps, and the follower coasts in between.
         price_scale: factor of the scenario's price of errors.
         error_scatter: factor of how far errors are expected to scatter about the plan.
         thrust_scatter: the same for the thrust.
@@ -44,7 +40,6 @@ class MPCSettings:
     finest_periods: Positive = 0.005
     coarsest_periods: Positive = 0.025
     growth: NonNegative = 0.15
-    hold_every: Annotated[int, Strict(), Field(ge=1)] = 1
     price_scale: Positive = 1.0
     error_scatter: NonNegative = 1.0
     thrust_scatter: NonNegative = 0.5
@@ -77,9 +72,7 @@ class MPC(AccelerationPolicy):
         rows = observation.reshape(-1, observation.shape[-1])
         estimates, instants = self._layout.estimate(rows), self._instants(rows)
         result = np.zeros((len(rows), 3))
-        for instant in np.unique(instants):
-            if self._rests(instant):
-                continue
+        for instant in np.unique(instants[instants < self.scenario.num_steps]):
             program = self.program(instant)
             for row in np.flatnonzero(instants == instant):
                 result[row] = _first(program.solve(estimates[row]))
@@ -112,11 +105,6 @@ class MPC(AccelerationPolicy):
         left = self._layout.scalar(rows, "time_left") * self._layout.period_s / self.scenario.dt_s
         ends = np.array([leg.end for leg in self._legs])
         return np.asarray(ends[self._layout.phase(rows)] - np.rint(left).astype(np.intp))
-
-    def _rests(self, instant: int) -> bool:
-        """Whether the follower coasts without a plan: at the end, and in a hold at most instants if so wanted."""
-        held = [instant - leg.arrival for leg in self._legs if leg.arrival <= instant < leg.end]
-        return instant >= self.scenario.num_steps or any(steps % self.gains.hold_every for steps in held)
 
     def _scatter(self) -> tuple[Array, Array]:
         """Scatter of the position (num_steps + 1,), m, and of the thrust (num_steps,), m/s^2, with their factors."""
