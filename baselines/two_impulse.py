@@ -50,13 +50,13 @@ class TwoImpulsePolicy(AccelerationPolicy):
         arrival = self._layout.state(observation, "arrival_error")
         first = self._course.impulse(arrival[..., :3], *at)
         off = self._course.is_off(arrival[..., :3], observation, *at)
-        brakes = self._layout.time_to_arrival_s(observation) <= self.gains.braking * self._burn_s(-arrival[..., 3:])
+        brakes = self._layout.time_to_arrival_s(observation) <= self._braking_s(arrival[..., 3:])
         transfer = np.where(brakes[..., None], -arrival[..., 3:], np.where(off[..., None], first, 0.0))
         wanted = transfer / self.scenario.dt_s
         kept = self._keeping.acceleration(now.error, *at)
         return self.within_limit(np.where(now.in_hold[..., None], kept, wanted))
 
-    def _burn_s(self, impulse_m_s: Array) -> Array:
-        """How long the burns (...) of impulses (..., 3) last, s."""
-        longest: Array = np.abs(impulse_m_s).max(axis=-1) / self._max_accel_m_s2
-        return longest
+    def _braking_s(self, velocity_m_s: Array) -> Array:
+        """How long before the arrival (...) the burn against a velocity (..., 3) begins, s; at least a step."""
+        burn_s = np.abs(velocity_m_s).max(axis=-1) / self._max_accel_m_s2
+        return np.maximum(self.gains.braking * burn_s, 1.01 * self.scenario.dt_s)
