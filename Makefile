@@ -55,5 +55,5 @@ $(REPORT): $(INPUTS) | $(BASE)
 # The test extras include the report's, so this set-up stands for both.
 $(TEST): $(INPUTS) | $(BASE)
 	rm -f $(REPORT) $(TEST)
-	$(INSTALL) '.[report,rl,video,dev]'
+	$(INSTALL) '.[report,optimal,rl,video,dev]'
 	touch $(REPORT) $@

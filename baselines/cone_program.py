@@ -11,9 +11,9 @@ Legend: F, G, d the model over a block; x states, u accelerations, t >= |(u, sig
 """
 
 from dataclasses import dataclass
-from typing import Final
+from types import ModuleType
+from typing import Any, Final
 
-import clarabel
 import numpy as np
 from scipy import sparse
 
@@ -79,12 +79,16 @@ class ConeProgram:
             horizon: what to solve.
             length_m: unit of lengths in the program; the solver likes numbers near 1.
             speed_m_s: unit of speeds.
+
+        Raises:
+            ModuleNotFoundError: Clarabel is not installed.
         """
         self._horizon, self._length_m = horizon, length_m
         self._scale = np.repeat([length_m, speed_m_s], 3)
         self._count = len(horizon.F)
         self._priced = np.flatnonzero(horizon.price > 0)
-        self._solver: clarabel.DefaultSolver | None = None
+        self._clarabel = clarabel()
+        self._solver: Any = None
         self._A, self._b, self._cones = self._constraints()
 
     def solve(self, start: Array) -> Plan:
@@ -93,17 +97,17 @@ class ConeProgram:
         b[:6] = (self._horizon.F[0] @ start + self._horizon.d[0]) / self._scale
         if self._solver is None:
             P, q = self._costs()
-            self._solver = clarabel.DefaultSolver(P, q, self._A, b, self._cones, _settings())
+            self._solver = self._clarabel.DefaultSolver(P, q, self._A, b, self._cones, self._settings())
         else:
             self._solver.update(b=b)
         solution = self._solver.solve()
         x, n = np.asarray(solution.x), self._count
-        good = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
+        status = self._clarabel.SolverStatus
         return Plan(
             cost_m_s=float(solution.obj_val) * self._unit_m_s,
             states=x[: 6 * n].reshape(n, 6) * self._scale,
             controls=x[6 * n : 9 * n].reshape(n, 3) * self._horizon.limit_m_s2,
-            solved=solution.status in good,
+            solved=solution.status in (status.Solved, status.AlmostSolved),
         )
 
     @property
@@ -123,13 +127,13 @@ class ConeProgram:
             errors = np.zeros(len(priced))
         return sparse.diags(P).tocsc(), np.concatenate([np.zeros(9 * n), thrust, errors])
 
-    def _constraints(self) -> tuple[sparse.csc_matrix, Array, list[object]]:
+    def _constraints(self) -> tuple[sparse.csc_matrix, Array, list[Any]]:
         """A, b and cones of A z + slack = b, slack in the cones; z has states, accelerations, t and s."""
         parts = [self._dynamics(), self._limits(), self._thrust_cones(), self._error_cones()]
         A = sparse.vstack([matrix for matrix, _ in parts]).tocsc()
         n = self._count
-        cones = [clarabel.ZeroConeT(6 * n), clarabel.NonnegativeConeT(6 * n)]
-        cones += [clarabel.SecondOrderConeT(5)] * (n + len(self._priced))
+        cones = [self._clarabel.ZeroConeT(6 * n), self._clarabel.NonnegativeConeT(6 * n)]
+        cones += [self._clarabel.SecondOrderConeT(5)] * (n + len(self._priced))
         return A, np.concatenate([b for _, b in parts]), cones
 
     def _dynamics(self) -> tuple[sparse.csc_matrix, Array]:
@@ -172,11 +176,23 @@ class ConeProgram:
         b[:, 4] = self._horizon.error_scatter_m[priced] / self._length_m
         return matrix, b.ravel()
 
+    def _settings(self) -> Any:
+        settings = self._clarabel.DefaultSettings()
+        settings.verbose = False
+        settings.presolve_enable = False  # a presolved program takes no new right-hand side
+        settings.max_threads = 1
+        settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
+        return settings
 
-def _settings() -> clarabel.DefaultSettings:
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.presolve_enable = False  # a presolved program takes no new right-hand side
-    settings.max_threads = 1
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-    return settings
+
+def clarabel() -> ModuleType:
+    """The solver, of the extra `optimal`.
+
+    Raises:
+        ModuleNotFoundError: it is not installed.
+    """
+    try:
+        import clarabel
+    except ModuleNotFoundError as error:
+        raise ModuleNotFoundError("mpc needs Clarabel: pip install 'formation-env[optimal]'") from error
+    return clarabel

@@ -11,6 +11,7 @@ from baselines.policy import AccelerationPolicy, Observations
 from baselines.timeline import by_steps_left
 from formation_env.dynamics.base import Array
 from formation_env.scenario import Scenario
+from formation_env.schedule import observation_layout
 from formation_env.settings import NonNegative, settings
 
 
@@ -39,6 +40,7 @@ class Deadband(AccelerationPolicy):
     def __init__(self, scenario: Scenario, gains: DeadbandSettings) -> None:
         super().__init__(scenario)
         self.gains = gains
+        self._layout = observation_layout(scenario)
         self._guidance = Guidance(scenario, gains.guidance)
         self._course = MidCourse(scenario, gains.correction)
         self._keeping = Keeping(scenario, gains.keeping)
@@ -51,10 +53,10 @@ class Deadband(AccelerationPolicy):
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
         now = self._guidance.track(observation)
-        at = (now.phase, now.steps_left)
-        miss = (self._course.coast(*at) @ now.error[..., None])[..., :3, 0]
-        off = self._course.is_off(miss, observation, *at)
-        impulse = np.where(off[..., None], self._course.impulse(miss, *at), 0.0)
-        transfer = self._own_thrust[at] + impulse / self.scenario.dt_s
-        kept = self._keeping.acceleration(now.error, *at)
-        return self.within_limit(np.where(now.in_hold[..., None], kept, transfer))
+        in_hold = self._layout.scalar(observation, "in_hold") > 0.5
+        miss = (self._course.coast(now.at) @ now.error[..., None])[..., :3, 0]
+        off = self._course.is_off(miss, observation, now.at)
+        impulse = np.where(off[..., None], self._course.impulse(miss, now.at), 0.0)
+        transfer = self._own_thrust[now.at] + impulse / self.scenario.dt_s
+        kept = self._keeping.acceleration(now.error, now.at)
+        return self.within_limit(np.where(in_hold[..., None], kept, transfer))

@@ -14,16 +14,15 @@ from functools import lru_cache
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baselines.expected_cost import expected_cost_gains
 from baselines.policy import Observations
 from baselines.riccati import closed_loop, least_fuel_gains
-from baselines.timeline import by_steps_left, nominal_start, start_error, transfer_reference
+from baselines.timeline import Instants, by_steps_left, nominal_start, start_error, transfer_reference
 from baselines.transfers import two_impulse
 from formation_env.dynamics.base import Array, DiscreteModel
 from formation_env.scenario import Scenario
-from formation_env.schedule import Leg, leg_reference, observation_layout
+from formation_env.schedule import Leg, leg_reference, legs, observation_layout
 from formation_env.settings import ConfigError
 
 Guide = Literal["automatic", "straight_line", "two_impulse", "hohmann", "least_fuel", "least_cost"]
@@ -36,41 +35,32 @@ _SAME_PLANE_M = 1e-3
 
 @dataclass(frozen=True)
 class Tracking:
-    """What a controller has to do now, for observations (...).
+    """Where the follower is, against where it should be, for observations (...).
 
     Attributes:
         error: estimated minus desired state (..., 6), m and m/s.
-        desired: desired state (..., 6).
-        residual: what the filter's model lacks to go along the desired path by itself over the next step, (..., 6).
-        phase: index of the phase (...).
-        steps_left: steps to its end (...).
-        in_hold: whether it has arrived (...).
+        at: phase (...) and steps left to its end (...), which index the tables of `by_steps_left`.
     """
 
     error: Array
-    desired: Array
-    residual: Array
-    phase: NDArray[np.intp]
-    steps_left: NDArray[np.intp]
-    in_hold: NDArray[np.bool_]
+    at: Instants
 
 
 class Guidance:
     """The desired path of a scenario, looked up by phase and steps left.
 
     Attributes:
-        residuals: `Tracking.residual` of all instants (phases, steps left, 6).
+        desired: states (phases, steps left, 6), m and m/s.
+        residuals: what the filter's model lacks to go along the desired path by itself over the next step, likewise.
     """
 
     def __init__(self, scenario: Scenario, guide: Guide) -> None:
-        self._dt_s = scenario.dt_s
-        self._layout = observation_layout(scenario)
-        self._offsets = by_steps_left(
-            scenario, lambda leg: desired_states(scenario, leg, guide) - _reference(scenario, leg)
-        )
-        self.residuals = by_steps_left(
-            scenario, lambda leg: _residual(scenario, leg, desired_states(scenario, leg, guide))
-        )
+        layout = observation_layout(scenario)
+        paths = {leg: desired_states(scenario, leg, guide) for leg in legs(scenario)}
+        self._layout, self._steps_per_unit = layout, layout.period_s / scenario.dt_s
+        self.desired = by_steps_left(scenario, lambda leg: paths[leg])
+        self.residuals = by_steps_left(scenario, lambda leg: _residual(scenario, leg, paths[leg]))
+        self._offsets = self.desired - by_steps_left(scenario, lambda leg: _reference(scenario, leg))
 
     def track(self, observation: Observations) -> Tracking:
         """Compare the estimate with the desired path.
@@ -78,20 +68,9 @@ class Guidance:
         Args:
             observation: (..., SIZE).
         """
-        layout = self._layout
-        reference = layout.state(observation, "reference")
-        phase = layout.phase(observation)
-        steps = np.rint(layout.scalar(observation, "time_left") * layout.period_s / self._dt_s).astype(np.intp)
-        steps = np.clip(steps, 0, self._offsets.shape[1] - 1)
-        offset = self._offsets[phase, steps]
-        return Tracking(
-            error=layout.state(observation, "error") - offset,
-            desired=reference + offset,
-            residual=self.residuals[phase, steps],
-            phase=phase,
-            steps_left=steps,
-            in_hold=layout.scalar(observation, "in_hold") > 0.5,
-        )
+        steps = np.rint(self._layout.scalar(observation, "time_left") * self._steps_per_unit).astype(np.intp)
+        at = self._layout.phase(observation), np.clip(steps, 0, self._offsets.shape[1] - 1)
+        return Tracking(self._layout.state(observation, "error") - self._offsets[at], at)
 
 
 def _reference(scenario: Scenario, leg: Leg) -> Array:

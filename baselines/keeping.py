@@ -7,10 +7,9 @@ position errors over the steps to come if the follower coasts, e~' M e~.
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from baselines.timeline import by_steps_left
+from baselines.timeline import Instants, by_steps_left
 from formation_env.dynamics.base import Array
 from formation_env.scenario import Scenario
 from formation_env.schedule import Leg, leg_reference
@@ -45,15 +44,13 @@ class Keeping:
         self._M = by_steps_left(scenario, lambda leg: coasting_sums(error_steps(scenario, leg), self._window)[1:])
         self._Gamma = by_steps_left(scenario, lambda leg: scenario.filter_model().steps(leg.start, leg.end).Gamma)
 
-    def acceleration(self, error: Array, phase: NDArray[np.intp], steps_left: NDArray[np.intp]) -> Array:
+    def acceleration(self, error: Array, at: Instants) -> Array:
         """Accelerations (..., 3), m/s^2, not cut to the limit; zero in a coast.
 
         Args:
             error: estimated error (..., 6) from the reference.
-            phase: index (...).
-            steps_left: to the phase's end (...).
+            at: phase (...) and steps left to its end (...).
         """
-        at = (phase, steps_left)
         M, Gamma = self._M[at], self._Gamma[at]
         coast = _times(self._A[at], np.concatenate([error, np.ones((*error.shape[:-1], 1))], axis=-1))
         pull, before = _times(M, coast), (coast * _times(M, coast)).sum(axis=-1)
@@ -61,7 +58,7 @@ class Keeping:
         stiffness = Gamma.swapaxes(-1, -2) @ M[..., :6, :6] @ Gamma
         impulse = -np.linalg.solve(stiffness + self._damping(Gamma), slope[..., None])[..., 0]
         gained = -2 * (slope * impulse).sum(axis=-1) - (impulse * _times(stiffness, impulse)).sum(axis=-1)
-        left = np.clip(steps_left - 1, 1, self._window)
+        left = np.clip(at[1] - 1, 1, self._window)
         fires = (before > left * self._gains.band_m**2) & (
             before - gained < (1 - self._gains.least_reduction) ** 2 * before
         )

@@ -106,15 +106,14 @@ class LQR(AccelerationPolicy):
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
         now = self._guidance.track(observation)
-        feedback = -(self.K[now.phase, now.steps_left] @ now.error[..., None])[..., 0]
-        acceleration: Array = feedback + self._own_thrust[now.phase, now.steps_left]
+        acceleration: Array = self._own_thrust[now.at] - (self.K[now.at] @ now.error[..., None])[..., 0]
         return np.where(self._pays(acceleration, now)[..., None], acceleration, 0.0)
 
     def _pays(self, acceleration: Array, now: Tracking) -> NDArray[np.bool_]:
         """Whether the first bit of an acceleration (..., 3) takes off more from the cost to come than the deadband."""
         if self.gains.deadband == 0:
             return np.ones(acceleration.shape[:-1], bool)
-        slope = (self._stiffness[now.phase, now.steps_left] @ acceleration[..., None])[..., 0]
+        slope = (self._stiffness[now.at] @ acceleration[..., None])[..., 0]
         return np.asarray(np.linalg.norm(slope, axis=-1) > self.gains.deadband * self.scenario.dt_s)
 
 

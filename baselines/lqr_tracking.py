@@ -46,13 +46,14 @@ class LQRTracking(AccelerationPolicy):
         self._guidance = Guidance(scenario, gains.guidance)
         parts = {leg: leg_gains(scenario, leg, gains) for leg in legs(scenario)}
         self.K = by_steps_left(scenario, lambda leg: parts[leg][0])
-        self._pull = by_steps_left(scenario, lambda leg: parts[leg][1])
+        pull = by_steps_left(scenario, lambda leg: parts[leg][1])
+        # u = pull - K x with x = y_d + e
+        self._own_thrust = pull - (self.K @ self._guidance.desired[..., None])[..., 0]
 
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
         now = self._guidance.track(observation)
-        at = (now.phase, now.steps_left)
-        return self._pull[at] - (self.K[at] @ (now.desired + now.error)[..., None])[..., 0]
+        return self._own_thrust[now.at] - (self.K[now.at] @ now.error[..., None])[..., 0]
 
 
 def leg_gains(scenario: Scenario, leg: Leg, gains: LQRTrackingSettings) -> tuple[Array, Array]:

@@ -6,7 +6,7 @@ Legend: Phi (6, 6) from now to the arrival, Phi_rv its block from velocities to 
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.timeline import by_steps_left
+from baselines.timeline import Instants, by_steps_left
 from baselines.transfers import LEAST_LEVERAGE
 from formation_env.dynamics.base import Array
 from formation_env.observation import SIGMA_DECADES, SIGMA_UNIT_POS_M, SIGMA_UNIT_VEL_M_S
@@ -36,21 +36,19 @@ class MidCourse:
         self._coast = by_steps_left(scenario, lambda leg: to_arrival(scenario, leg))
         self._aim = by_steps_left(scenario, lambda leg: aims(scenario, leg))
 
-    def coast(self, phase: NDArray[np.intp], steps_left: NDArray[np.intp]) -> Array:
+    def coast(self, at: Instants) -> Array:
         """Phi (..., 6, 6); zero in hold."""
-        coast: Array = self._coast[phase, steps_left]
+        coast: Array = self._coast[at]
         return coast
 
-    def impulse(self, miss_m: Array, phase: NDArray[np.intp], steps_left: NDArray[np.intp]) -> Array:
+    def impulse(self, miss_m: Array, at: Instants) -> Array:
         """The impulse (..., 3), m/s, that takes a predicted miss (..., 3), m, away as far as it has leverage on it."""
-        impulse: Array = -(self._aim[phase, steps_left] @ miss_m[..., None])[..., 0]
+        impulse: Array = -(self._aim[at] @ miss_m[..., None])[..., 0]
         return impulse
 
-    def is_off(
-        self, miss_m: Array, observation: NDArray[np.floating], phase: NDArray[np.intp], steps_left: NDArray[np.intp]
-    ) -> NDArray[np.bool_]:
+    def is_off(self, miss_m: Array, observation: NDArray[np.floating], at: Instants) -> NDArray[np.bool_]:
         """Whether a predicted miss (..., 3), m, is more than the filter may just imagine."""
-        Phi = self._coast[phase, steps_left]
+        Phi = self._coast[at]
         sigma_pos_m, sigma_vel_m_s = (
             sigmas(self._layout.scalar(observation, "sigma_pos"), SIGMA_UNIT_POS_M),
             sigmas(self._layout.scalar(observation, "sigma_vel"), SIGMA_UNIT_VEL_M_S),

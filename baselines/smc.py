@@ -41,6 +41,7 @@ class SMC(AccelerationPolicy):
         model = scenario.filter_model()
         first = model.steps(0, 1)
         self.Ce = gains.surface.Ce(DiscreteModel(first.Phi[0], first.Gamma[0], first.delta[0]), scenario.dt_s)
+        self._path = self._guidance.residuals @ self.Ce.T
         self._Ce_Phi = by_steps_left(scenario, lambda leg: self.Ce @ model.steps(leg.start, leg.end).Phi)
         self._inverse = by_steps_left(
             scenario, lambda leg: np.linalg.inv(self.Ce @ model.steps(leg.start, leg.end).Gamma)
@@ -53,11 +54,10 @@ class SMC(AccelerationPolicy):
         if isinstance(reaching, Relay):
             return reaching.u0_m_s2 * self.sign(s)
         # Ce x_d(k+1) - Ce Phi x(k) = Ce residual - Ce Phi (x - x_d): the path's own thrust, and the error's free motion
-        at = (now.phase, now.steps_left)
-        free = now.residual @ self.Ce.T - (self._Ce_Phi[at] @ now.error[..., None])[..., 0]
+        free = self._path[now.at] - (self._Ce_Phi[now.at] @ now.error[..., None])[..., 0]
         # s(k+1) by the reaching law (eq. 4.56)
         following = s + reaching.change(s, self.sign(s), self.scenario.dt_s)
-        return np.asarray((self._inverse[at] @ (free - following)[..., None])[..., 0])
+        return np.asarray((self._inverse[now.at] @ (free - following)[..., None])[..., 0])
 
     def sign(self, s: Array) -> Array:
         """Sgn s (..., 3), or sat(s / Delta) with a boundary layer."""

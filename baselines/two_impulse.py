@@ -46,15 +46,15 @@ class TwoImpulsePolicy(AccelerationPolicy):
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2, along the wanted impulse even at the limit."""
         now = self._guidance.track(observation)
-        at = (now.phase, now.steps_left)
+        in_hold = self._layout.scalar(observation, "in_hold") > 0.5
         arrival = self._layout.state(observation, "arrival_error")
-        first = self._course.impulse(arrival[..., :3], *at)
-        off = self._course.is_off(arrival[..., :3], observation, *at)
+        first = self._course.impulse(arrival[..., :3], now.at)
+        off = self._course.is_off(arrival[..., :3], observation, now.at)
         brakes = self._layout.time_to_arrival_s(observation) <= self._braking_s(arrival[..., 3:])
         transfer = np.where(brakes[..., None], -arrival[..., 3:], np.where(off[..., None], first, 0.0))
         wanted = transfer / self.scenario.dt_s
-        kept = self._keeping.acceleration(now.error, *at)
-        return self.within_limit(np.where(now.in_hold[..., None], kept, wanted))
+        kept = self._keeping.acceleration(now.error, now.at)
+        return self.within_limit(np.where(in_hold[..., None], kept, wanted))
 
     def _braking_s(self, velocity_m_s: Array) -> Array:
         """How long before the arrival (...) the burn against a velocity (..., 3) begins, s; at least a step."""

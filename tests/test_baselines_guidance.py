@@ -76,14 +76,14 @@ def test_tracking_agrees_with_the_truths_clock(guide: Guide) -> None:
     promised: Array | None = None
     for step in range(leg.end - 1):
         now = guidance.track(observation)
-        assert (np.abs(now.desired + now.error - info["estimate"]) < band).all()
-        assert (now.steps_left == leg.end - step).all()
-        assert (now.in_hold == (step >= leg.arrival)).all()
+        assert (np.abs(guidance.desired[now.at] + now.error - info["estimate"]) < band).all()
+        assert (now.at[1] == leg.end - step).all()
+        assert (now.at[0] == leg.index).all()
         if promised is not None:
-            assert (np.abs(now.desired - promised) < band).all()
+            assert (np.abs(guidance.desired[now.at] - promised) < band).all()
         if step >= leg.arrival and guide != "least_cost":
-            assert (np.abs(now.desired - leg_reference(scenario, leg, np.array(step))) < band).all()
-        promised = now.desired @ model.Phi.T + model.delta + now.residual
+            assert (np.abs(guidance.desired[now.at] - leg_reference(scenario, leg, np.array(step))) < band).all()
+        promised = guidance.desired[now.at] @ model.Phi.T + model.delta + guidance.residuals[now.at]
         observation, _, _, _, info = env.step(np.zeros((2, 3), np.float32))
 
 

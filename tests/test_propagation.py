@@ -127,5 +127,5 @@ def test_wrong_arrays_are_refused_by_name(state: object, instants: object, argum
 
 def test_unknown_model_is_refused() -> None:
     """The name of the model is checked, too."""
-    with pytest.raises(ValueError, match=r"no model named 'kepler'; known: hcw, modified_hcw, yamanaka_ankersen"):
+    with pytest.raises(ValueError, match=r"no model named 'kepler'; known: hcw, .*, yamanaka_ankersen"):
         propagate(CIRCLE, [0.0], dynamics="kepler")

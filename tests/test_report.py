@@ -147,14 +147,14 @@ def test_a_failure_leaves_the_old_files(folder: Path, tmp_path: Path) -> None:
 def test_files_are_written_all_or_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failure: BaseException) -> None:
     """The second of two files cannot be written: the first keeps its old content, no temporary stays."""
     (tmp_path / "a.csv").write_text("old")
-    write_text = Path.write_text
+    write_bytes = Path.write_bytes
 
-    def failing(self: Path, data: str, encoding: str | None = None, newline: str | None = None) -> int:
+    def failing(self: Path, data: bytes) -> int:
         if self.name.startswith(".b."):
             raise failure
-        return write_text(self, data, encoding=encoding, newline=newline)
+        return write_bytes(self, data)
 
-    monkeypatch.setattr(Path, "write_text", failing)
+    monkeypatch.setattr(Path, "write_bytes", failing)
     with pytest.raises(type(failure)):
         write_texts(tmp_path, {"a.csv": "new", "b.csv": "new"})
     assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]

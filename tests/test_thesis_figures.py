@@ -20,7 +20,7 @@ from baselines.registry import make_policy
 from baselines.thesis import claims, jobs, plan, report, scenarios, tables
 from baselines.thesis.claim import Claim
 from baselines.thesis.figures import FIGURES, drawings, orbits, style
-from baselines.thesis.flights import Flights, desired_states, fly
+from baselines.thesis.flights import Flights, desired_path, fly
 from baselines.thesis.report_page import Content, Picture, render
 from formation_env import load_scenario
 from formation_env.constants import OMEGA_EARTH, R_EARTH
@@ -55,7 +55,7 @@ def test_scenarios_start_where_the_thesis_prints() -> None:
     keeping, reconfiguration = scenarios.keeping(), scenarios.reconfiguration()
     start = keeping.start.formation.state(keeping.orbit)
     np.testing.assert_allclose(start, PRINTED_START, atol=0.05)
-    entry = desired_states(reconfiguration, "automatic")[0]
+    entry = desired_path(reconfiguration, "automatic")[0]
     np.testing.assert_allclose(entry, [0, 3324, 0, 1.8, 0, 3.6], atol=0.5)
     np.testing.assert_array_equal(scenarios.with_velocity(reconfiguration, (1, 2, 3)), [0, 5000, 0, 1, 2, 3])
 
@@ -110,6 +110,19 @@ def test_what_is_kept_changes_no_sum(flown: Mapping[str, Flights]) -> None:
     np.testing.assert_allclose(apart, every[1].delta_v(), rtol=1e-12)
     with pytest.raises(ValueError, match=r"0\.123 periods after the start was not kept"):
         every[1].index(0.123)
+
+
+def test_measurements_are_the_sensors(flown: Mapping[str, Flights]) -> None:
+    """Kept measurements scatter about the truth as the sensor says, and there are none while the link is closed.
+
+    A standard deviation of n numbers scatters by 1 / sqrt(2 n), with n > 400 below 4 %; 5 of these.
+    """
+    flights = flown["failure"]
+    measured = ~np.isnan(flights.measurement[..., 0])
+    np.testing.assert_array_equal(measured[:, 0, 0], ~flights.scenario.dropout.closed(flights.time_s))
+    error = (flights.measurement - flights.truth[..., :3])[measured]
+    assert error.std() == pytest.approx(2.0, rel=0.2)
+    assert np.isnan(flown["mission"].measurement).all()
 
 
 def test_axes_bound_the_magnitude(flown: Mapping[str, Flights]) -> None:

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 import truth
 
-from baselines.thesis import model_costs, model_errors, model_lessons, report_models
+from baselines.thesis import model_costs, model_errors, report_lessons, report_models
 from baselines.thesis.figures import style
 from baselines.thesis.model_errors import MODELS, SPANS, Survey, leader
 from baselines.thesis.report_page import Content, render
@@ -21,7 +21,7 @@ FACTS = {"command": "c", "episodes": 1, "step_s": "1", "versions": {"python": "3
 @pytest.fixture(scope="module")
 def errors() -> pd.DataFrame:
     """Surveys of the leaders that the sentences speak of."""
-    spoken = [*model_lessons.LEADERS.values(), leader(0.0)]
+    spoken = [*report_lessons.LEADERS.values(), leader(0.0)]
     bare = [leader(eccentricity=e, j2=False) for e in (0.0, 0.1)]
     return pd.concat([Survey(orbit).fly() for orbit in (*spoken, *bare)], ignore_index=True)
 
@@ -126,7 +126,7 @@ def test_sizes_are_greatest_distances() -> None:
 @pytest.mark.parametrize(("level", "size_m"), [(1.0, 0.0), (8.0, 200.0 * 4.0 ** (1 / 3)), (1e3, math.inf)])
 def test_crossing_of_a_power_law(level: float, size_m: float) -> None:
     """From 4 to 32 while the size goes from 200 to 800 m: 8 is a third of the way, in logarithms."""
-    assert model_lessons.crossing(np.array([200.0, 800.0]), np.array([4.0, 32.0]), level) == pytest.approx(size_m)
+    assert report_lessons.crossing(np.array([200.0, 800.0]), np.array([4.0, 32.0]), level) == pytest.approx(size_m)
 
 
 def test_trials_fly_all_laws_on_the_same_seeds() -> None:

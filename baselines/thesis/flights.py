@@ -1,22 +1,25 @@
 """Many flights at once, with exact sums and maxima between the instants that are kept."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.guidance import Guide, desired_path
+from baselines.guidance import Guide, desired_states
 from baselines.side_by_side import SideBySide
 from formation_env.dynamics.base import Array
 from formation_env.envs import interface
 from formation_env.envs.vector import FormationVectorEnv
 from formation_env.evaluation import Policy
 from formation_env.scenario import Scenario
-from formation_env.schedule import leg_reference, legs
+from formation_env.schedule import legs
 
 Floats = NDArray[np.float32]
+
+_SEES: Final = {"process_noise_m_s2": 1.0, "sigma_pos_m": 1e-6, "sigma_vel_m_s": 1e6}
+"""Beliefs of a filter that takes each measured position for the truth, and nothing else."""
 
 FEW: Final = 1
 """Seeds of each policy whose whole states are kept, unless another number is asked for."""
@@ -44,6 +47,8 @@ class Flights:
         truth: true states (instants, policies, first few seeds, 6), m and m/s.
         estimate: estimated states, the same shape.
         thrust_m_s2: accelerations over the steps to the instants (instants, policies, first few seeds, 3).
+        measurement: measured positions (instants, policies, first few seeds, 3), m; NaN where none arrived, and all
+            NaN if they were not asked for.
     """
 
     scenario: Scenario
@@ -60,6 +65,7 @@ class Flights:
     truth: Floats
     estimate: Floats
     thrust_m_s2: Floats
+    measurement: Floats
 
     @property
     def time_s(self) -> Array:
@@ -118,6 +124,7 @@ def fly(
     guide: Guide = "automatic",
     every: int = 1,
     few: int = FEW,
+    measured: bool = False,
     start: Array | None = None,
     progress: Callable[[int], Any] = lambda steps: None,
 ) -> Flights:
@@ -130,21 +137,26 @@ def fly(
         guide: the desired path that errors are measured from, see `baselines.guidance`.
         every: steps between kept instants; sums and maxima are exact all the same.
         few: seeds of each policy, the first ones, whose states are kept.
+        measured: whether their measurements are kept, too.
         start: true LVLH state (6,) to start at in place of the scenario's start and its spread, m and m/s.
         progress: called with the number of steps flown since the last call, of all rows together.
     """
     env = FormationVectorEnv(len(policies) * len(seeds), scenario)
-    observations, infos = env.reset(
-        seed=[*seeds] * len(policies), options=None if start is None else {interface.START_OPTION: start}
-    )
-    log = _Log(scenario, (len(policies), len(seeds)), kept_steps(scenario, every), min(few, len(seeds)), guide)
-    log.add(infos)
+    options = None if start is None else {interface.START_OPTION: start}
+    observations, infos = env.reset(seed=[*seeds] * len(policies), options=options)
+    few = min(few, len(seeds))
+    log = _Log(scenario, (len(policies), len(seeds)), kept_steps(scenario, every), few, guide)
+    witness = _Witness(scenario, len(policies), seeds[:few], options) if measured else None
+    log.add(infos, measurement=witness.seen if witness else None)
     crew, going = SideBySide(policies), np.ones(env.num_envs, bool)
     for _ in range(scenario.num_steps):
-        observations, _, terminations, truncations, infos = env.step(crew.predict(observations)[0])
+        actions = crew.predict(observations)[0]
+        observations, _, terminations, truncations, infos = env.step(actions)
         if terminations.any() or truncations.any():
             infos = _with_finals(infos)
-        log.add(infos, going)
+        if witness:
+            witness.step(actions)
+        log.add(infos, going, witness.seen if witness else None)
         going &= ~(terminations | truncations)
         progress(env.num_envs)
     return log.flights(tuple(int(seed) for seed in seeds))
@@ -163,16 +175,12 @@ def whole_periods(scenario: Scenario) -> list[int]:
     return [time for time in range(1, longest + 1) if scenario.steps(time) <= scenario.num_steps]
 
 
-def desired_states(scenario: Scenario, guide: Guide) -> Array:
+def desired_path(scenario: Scenario, guide: Guide) -> Array:
     """The desired path (num_steps + 1, 6): each leg's from its beginning, the end of a leg being its own."""
     states = np.empty((scenario.num_steps + 1, 6))
     for leg in legs(scenario):
         first = leg.start + 1 if leg.index else 0
-        path = desired_path(scenario, leg, guide)
-        steps = np.arange(leg.start, leg.end + 1)
-        whole = leg_reference(scenario, leg, steps)
-        whole[: len(path)] = path
-        states[first : leg.end + 1] = whole[first - leg.start :]
+        states[first : leg.end + 1] = desired_states(scenario, leg, guide)[first - leg.start :]
     return states
 
 
@@ -180,9 +188,38 @@ def _with_finals(infos: dict[str, Any]) -> dict[str, Any]:
     """Infos of a step, with those of the ended episodes in place of the new ones'."""
     finals, ended = infos["final_info"], infos["_final_info"]
     merged = dict(infos)
-    for name in ("true_state", "estimate", interface.INFO_THRUST):
-        merged[name] = np.where(ended[:, None], finals[name], infos[name])
+    for name in ("true_state", "estimate", "measured", interface.INFO_THRUST):
+        mask = ended if finals[name].ndim == 1 else ended[:, None]
+        merged[name] = np.where(mask, finals[name], infos[name])
     return merged
+
+
+class _Witness:
+    """Sees the measurements: it flies the same episodes with a filter that trusts nothing else, and gives its estimate.
+
+    Attributes:
+        seen: the last measured positions (policies, few, 3), m; NaN where none arrived.
+    """
+
+    def __init__(
+        self, scenario: Scenario, policies: int, seeds: Sequence[int], options: dict[str, Array] | None
+    ) -> None:
+        self._shape = (policies, len(seeds))
+        self._env = FormationVectorEnv(
+            policies * len(seeds), replace(scenario, filter=replace(scenario.filter, **_SEES))
+        )
+        self._look(self._env.reset(seed=[*seeds] * policies, options=options)[1])
+
+    def step(self, actions: Floats) -> None:
+        """The same step as that of all rows (rows, 3)."""
+        policies, few = self._shape
+        chosen = actions.reshape(policies, -1, 3)[:, :few].reshape(-1, 3)
+        *_, terminations, truncations, infos = self._env.step(chosen)
+        self._look(_with_finals(infos) if (terminations | truncations).any() else infos)
+
+    def _look(self, infos: dict[str, Any]) -> None:
+        seen = np.where(infos["measured"][:, None], infos["estimate"][:, :3], np.nan)
+        self.seen = seen.reshape(*self._shape, 3)
 
 
 class _Log:
@@ -194,7 +231,7 @@ class _Log:
         count = len(steps)
         longest = int(np.diff(steps, prepend=-1).max())
         self._scenario, self._steps, self._shape, self._few = scenario, steps, shape, few
-        self._path = desired_states(scenario, guide)
+        self._path = desired_path(scenario, guide)
         self._step = self._place = self._filled = 0
         self._positions = np.empty((longest, shape[0] * shape[1], 3))
         self._thrusts = np.empty_like(self._positions)
@@ -202,8 +239,11 @@ class _Log:
         self._sums, self._effort = np.empty((2, count, *shape)), np.empty((count, *shape, 3))
         self._states = np.empty((2, count, shape[0], few, 6), np.float32)
         self._few_thrusts = np.empty((count, shape[0], few, 3), np.float32)
+        self._measurements = np.full((count, shape[0], few, 3), np.nan, np.float32)
 
-    def add(self, infos: dict[str, Any], going: NDArray[np.bool_] | None = None) -> None:
+    def add(
+        self, infos: dict[str, Any], going: NDArray[np.bool_] | None = None, measurement: Array | None = None
+    ) -> None:
         """The next instant; rows that are not going any more give NaN."""
         self._positions[self._filled] = infos["true_state"][:, :3] - self._path[self._step, :3]
         self._thrusts[self._filled] = infos[interface.INFO_THRUST]
@@ -211,6 +251,8 @@ class _Log:
             self._positions[self._filled, ~going] = self._thrusts[self._filled, ~going] = np.nan
         self._filled += 1
         if self._step == self._steps[self._place]:
+            if measurement is not None:
+                self._measurements[self._place] = measurement
             self._keep(infos)
         self._step += 1
 
@@ -260,4 +302,5 @@ class _Log:
             truth=self._states[0],
             estimate=self._states[1],
             thrust_m_s2=self._few_thrusts,
+            measurement=self._measurements,
         )

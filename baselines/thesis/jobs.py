@@ -52,6 +52,7 @@ class Job:
         guide: the desired path that errors are measured from.
         every: steps between kept instants.
         few: seeds whose states are kept.
+        measured: whether their measurements are kept, too.
         start: true state (6,) to start at, if not the scenario's.
     """
 
@@ -61,6 +62,7 @@ class Job:
     guide: Guide = "automatic"
     every: int = 1
     few: int = FEW
+    measured: bool = False
     start: tuple[float, ...] | None = None
 
     @property
@@ -78,6 +80,7 @@ class Job:
             self.guide,
             self.every,
             self.few,
+            self.measured,
             None if self.start is None else np.array(self.start),
             lambda _: progress(share),
         )

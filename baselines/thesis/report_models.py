@@ -7,7 +7,7 @@ from typing import Any, Final
 import pandas as pd
 from matplotlib.figure import Figure
 
-from baselines.thesis import model_costs, model_errors, model_lessons
+from baselines.thesis import model_costs, model_errors, report_lessons
 from baselines.thesis.figures import model_errors as figures
 from baselines.thesis.figures import style
 from baselines.thesis.jobs import Work
@@ -22,7 +22,7 @@ _SAME: Final = (
     "Leader and follower start with the same states in the truth and in the model. The error is the greatest one up to "
     "then, of position. "
 )
-_NEAR: Final = f"The formations are {model_lessons.NEAR_M:g} m large. "
+_NEAR: Final = f"The formations are {report_lessons.NEAR_M:g} m large. "
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def found(flown: Mapping[str, Any]) -> Found:
 
 def shown(content: Content, numbers: Found, contents: dict[str, bytes]) -> Content:
     """The page's content with this section, whose files are added to the folder's contents."""
-    enough = model_lessons.good_enough(numbers.errors)
+    enough = report_lessons.good_enough(numbers.errors)
     tables = {"model_errors": numbers.errors, "model_costs": numbers.costs, "model_guide": enough}
     contents |= {f"{name}.csv": table.to_csv(index=False).encode() for name, table in tables.items()}
     pictures = []
@@ -71,14 +71,14 @@ def shown(content: Content, numbers: Found, contents: dict[str, bytes]) -> Conte
         picture = Picture(f"M.{index}", title, "", note, images["svg"])
         contents |= {f"{picture.anchor}.{kind}": image for kind, image in images.items()}
         pictures.append(picture)
-    guide = Table("model_guide", "Which model is good enough", GUIDE_TEXT, model_lessons.guide(enough))
-    lessons = model_lessons.sentences(numbers.errors, numbers.costs)
+    guide = Table("model_guide", "Which model is good enough", GUIDE_TEXT, report_lessons.guide(enough))
+    lessons = report_lessons.sentences(numbers.errors, numbers.costs)
     return replace(content, model_errors=pictures, lessons=lessons, guide=guide)
 
 
 def _figures(numbers: Found) -> list[tuple[str, str, Figure]]:
     """Title, note and drawing of each figure."""
-    errors, near_m = numbers.errors, model_lessons.NEAR_M
+    errors, near_m = numbers.errors, report_lessons.NEAR_M
     size = (
         "The leader is on a circle at 600 km and 60°. Dotted is what linearisation alone does; the distance from it is "
         "J2's. Where lines lie on each other, the models do not differ."

@@ -22,7 +22,7 @@ from formation_env.constants import MU_MOON, MU_SUN, R_EARTH
 from formation_env.dynamics.base import Array
 from formation_env.elements import to_cartesian
 from formation_env.ephemeris import moon_position_m, sun_position_m
-from formation_env.frames import eci_to_lvlh, lvlh_frame, lvlh_to_eci
+from formation_env.frames import eci_to_lvlh, lvlh_axes, lvlh_frame, lvlh_to_eci
 from formation_env.orbit import Orbit
 from formation_env.perturbations import Perturbations
 from formation_env.spacecraft import Spacecraft
@@ -32,10 +32,12 @@ TOLERANCE: Final = 1e-12
 
 NODES: Final = (0.0, 1 / 3, 1 / 2, 2 / 3)
 """Instants within a substep at which the leader is needed, and the next substep's first."""
-NEAR_FIELDS: Final = {"position": 3, "velocity": 3, "acceleration": 3, "x_axis": 3, "y_axis": 3, "z_axis": 3}
-FAR_FIELDS: Final = {"sun": 3, "moon": 3}
-NEAR_WIDTH: Final = sum(NEAR_FIELDS.values())
-FAR_WIDTH: Final = NEAR_WIDTH + sum(FAR_FIELDS.values())
+FIELDS: Final = {"position": 0, "velocity": 3, "acceleration": 6, "x_axis": 9, "y_axis": 12, "z_axis": 15}
+"""Where a node of the leader's table has which vector, all along ECI."""
+FAR_FIELDS: Final = {"sun": 18, "moon": 21}
+"""What follows if Sun or Moon matter."""
+NEAR_WIDTH: Final = 3 * len(FIELDS)
+FAR_WIDTH: Final = NEAR_WIDTH + 3 * len(FAR_FIELDS)
 MAX_SUBSTEP_S: Final = 60.0
 
 
@@ -117,6 +119,7 @@ class Leader:
         position: ECI (T, 3), m.
         velocity: ECI (T, 3), m/s.
         acceleration: ECI (T, 3), m/s^2.
+        normal_accel: its part along the orbit normal (T,), m/s^2.
         axes: LVLH axes along ECI (T, 3, 3): row 0 is x, row 1 y, row 2 z.
         rotation: LVLH's angular velocity along LVLH (T, 3), rad/s.
     """
@@ -124,13 +127,14 @@ class Leader:
     position: Array
     velocity: Array
     acceleration: Array
+    normal_accel: Array
     axes: Array
     rotation: Array
 
     @property
     def motion(self) -> tuple[Array, Array, Array]:
         """Position, velocity, and acceleration along the orbit normal (T,): what the frames need."""
-        return self.position, self.velocity, np.vecdot(self.acceleration, self.axes[:, 2])
+        return self.position, self.velocity, self.normal_accel
 
 
 def leader_path(world: World, craft: Spacecraft, times_s: Array) -> Leader:
@@ -138,9 +142,9 @@ def leader_path(world: World, craft: Spacecraft, times_s: Array) -> Leader:
     states = coast(world, craft, np.concatenate(to_cartesian(world.orbit.elements))[None], times_s)
     position, velocity = np.split(states[:, 0], 2, axis=1)
     acceleration = world.acceleration(times_s, position, velocity, craft)
-    normal = np.cross(position, velocity)
-    axes, rotation = lvlh_frame(position, velocity, np.vecdot(acceleration, normal) / np.linalg.norm(normal, axis=-1))
-    return Leader(position, velocity, acceleration, axes, rotation)
+    normal_accel = np.vecdot(acceleration, lvlh_axes(position, velocity)[:, 2])
+    axes, rotation = lvlh_frame(position, velocity, normal_accel)
+    return Leader(position, velocity, acceleration, normal_accel, axes, rotation)
 
 
 def relative_path(world: World, follower: Spacecraft, leader: Spacecraft, states: Array, times_s: Array) -> Array:
@@ -172,8 +176,8 @@ def substeps(dt_s: float) -> int:
 def leader_table(world: World, craft: Spacecraft, dt_s: float, num_steps: int) -> Array:
     """What the compiled step needs to know of the leader, one row for each step (num_steps, width).
 
-    A row has the leader at `NODES` of each substep and at the end, the fields `NEAR_FIELDS` (and `FAR_FIELDS`) at each,
-    then LVLH's angular velocity about x and z at the step's start and at its end.
+    A row has the leader at `NODES` of each substep and at the end, `FIELDS` (and `FAR_FIELDS`) at each; then LVLH's
+    angular velocity about x and z at the step's start and at its end.
     """
     count = substeps(dt_s)
     shares = (np.arange(num_steps * count)[:, None] + np.array(NODES)).ravel() / count

@@ -6,7 +6,7 @@ import numpy as np
 
 from formation_env.constants import MU_MOON, MU_SUN
 from formation_env.dynamics.base import Array
-from formation_env.dynamics.nonlinear import FAR_WIDTH, NEAR_FIELDS, NEAR_WIDTH, NODES
+from formation_env.dynamics.nonlinear import FAR_FIELDS, FAR_WIDTH, FIELDS, NEAR_WIDTH, NODES
 from formation_env.fastmath import exp, fma
 from formation_env.forces import drag, gravity, radiation_pressure, third_body
 from formation_env.jit import LANES, lane, stage
@@ -33,9 +33,11 @@ _A: Final = np.array(
 )
 _NODE_OF_STAGE: Final = (0, 1, 3, 1, 2, 2, 4)
 
-_AXES: Final = 9 * LANES  # offset of LVLH's axes in a node
-_FAR: Final = NEAR_WIDTH * LANES
-assert list(NEAR_FIELDS) == ["position", "velocity", "acceleration", "x_axis", "y_axis", "z_axis"]
+_VELOCITY: Final = FIELDS["velocity"] * LANES
+_ACCELERATION: Final = FIELDS["acceleration"] * LANES
+_AXES: Final = FIELDS["x_axis"] * LANES  # and the other two behind it
+_SUN: Final = FAR_FIELDS["sun"] * LANES
+_MOON: Final = FAR_FIELDS["moon"] * LANES
 
 
 @lane
@@ -135,10 +137,11 @@ def _near(t: Array, node: int, state: int, rate: int, push: int, forces: Forces)
     gx, gy, gz = gravity(x, y, z, forces.j2)
     height = np.sqrt(x * x + y * y + z * z) - forces.base_radius
     density = forces.density * exp(-height * forces.per_scale_height)
-    vx, vy, vz = t[node + 3 * LANES] + u, t[node + 4 * LANES] + v, t[node + 5 * LANES] + w
+    b = node + _VELOCITY
+    vx, vy, vz = t[b] + u, t[b + LANES] + v, t[b + 2 * LANES] + w
     dx, dy, dz = drag(vx, vy, vz, density, forces.drag_area)
     ax, ay, az = t[push], t[push + LANES], t[push + 2 * LANES]
-    a, b = node + 6 * LANES, node + _AXES
+    a, b = node + _ACCELERATION, node + _AXES
     t[rate], t[rate + LANES], t[rate + 2 * LANES] = u, v, w
     t[rate + 3 * LANES] = gx + dx - t[a] + (ax * t[b] + ay * t[b + 3 * LANES] + az * t[b + 6 * LANES])
     b += LANES
@@ -151,10 +154,10 @@ def _near(t: Array, node: int, state: int, rate: int, push: int, forces: Forces)
 def _distant(t: Array, node: int, state: int, rate: int, forces: Forces) -> None:
     """What Sun, Moon and sunlight add."""
     x, y, z = t[node] + t[state], t[node + LANES] + t[state + LANES], t[node + 2 * LANES] + t[state + 2 * LANES]
-    b = node + _FAR
+    b, m = node + _SUN, node + _MOON
     sx, sy, sz = t[b], t[b + LANES], t[b + 2 * LANES]
     ax, ay, az = third_body(x, y, z, sx, sy, sz, forces.sun * MU_SUN)
-    bx, by, bz = third_body(x, y, z, t[b + 3 * LANES], t[b + 4 * LANES], t[b + 5 * LANES], forces.moon * MU_MOON)
+    bx, by, bz = third_body(x, y, z, t[m], t[m + LANES], t[m + 2 * LANES], forces.moon * MU_MOON)
     px, py, pz = radiation_pressure(x, y, z, sx, sy, sz, forces.radiation_area)
     t[rate + 3 * LANES] += ax + bx + px
     t[rate + 4 * LANES] += ay + by + py

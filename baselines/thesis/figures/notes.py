@@ -19,10 +19,7 @@ from baselines.thesis.figures.drawings import (
 )
 from baselines.thesis.flights import Flights
 
-NO_MEASUREMENTS: Final = (
-    "The environments do not give single measurements away, so they are not drawn; at a sigma of 2 m they would lie on "
-    "the true position. "
-)
+MEASUREMENTS: Final = "At a sigma of 2 m the measurements lie on the true position. "
 READING: Final = "On the dynamics as printed, k of eq. (2.62) without its n, "
 
 
@@ -79,7 +76,7 @@ def _estimation(flown: Flown) -> str:
     misses = np.linalg.norm((keeping.estimate - keeping.truth)[after, LQR, 0, :3], axis=-1)
     return (
         f"After the first period the estimate's position is wrong by {number(float(np.sqrt((misses**2).mean())))} m "
-        f"(root mean square). {NO_MEASUREMENTS}Cross-track the follower stays behind the desired path, which Figure "
+        f"(root mean square). {MEASUREMENTS}Cross-track the follower stays behind the desired path, which Figure "
         "5.7 explains."
     )
 
@@ -201,11 +198,11 @@ NOTES: Final[dict[str, Callable[[Flown], str]]] = {
     "5.7": _keeping,
     "5.9": _finer,
     "5.10": _sweep,
-    "5.11": lambda flown: NO_MEASUREMENTS,
+    "5.11": lambda flown: MEASUREMENTS,
     "5.12": _failure,
     "5.13": _with_and_without,
     "5.14": _smc,
-    "5.17": lambda flown: NO_MEASUREMENTS,
+    "5.17": lambda flown: MEASUREMENTS,
     "5.18": _smc_failure,
     "5.19": _lqr_or_smc,
     "5.20": _reconfiguration,

@@ -92,17 +92,20 @@ class Window:
 
 
 def estimation(flights: Flights, policy: int, windows: Sequence[Window], color: str) -> Figure:
-    """Desired, true and estimated position along each axis, each axis in a window of its own; no data is shaded."""
+    """Desired, true, measured and estimated position along each axis, each in a window; no measurement is shaded."""
     figure = style.sheet(6.0)
     for axes, window, axis in zip(figure.subplots(3, 1), windows, range(3), strict=True):
         inside = (flights.time_s >= window.start_s) & (flights.time_s <= window.end_s)
         time_s = flights.time_s[inside]
         desired = flights.desired[inside, axis]
-        true, estimate = (states[inside, policy, 0, axis] for states in (flights.truth, flights.estimate))
+        true, measured, estimate = (
+            states[inside, policy, 0, axis] for states in (flights.truth, flights.measurement, flights.estimate)
+        )
         for start_s, end_s in outages(flights, time_s):
             axes.axvspan(start_s, end_s, color=style.DESIRED, alpha=0.2, lw=0, label="no measurement")
         axes.plot(time_s, desired, color=style.DESIRED, lw=3, label="desired")
         axes.plot(time_s, true, color=color, label="true position")
+        axes.plot(time_s, measured, color=style.START, linestyle="", marker=".", markersize=3, label="measurement")
         axes.plot(time_s, estimate, color="black", linestyle=":", lw=1.8, label="estimation")
         axes.set_xlim(window.start_s, min(window.end_s, flights.time_s[-1]))
         style.label(axes, TIME, f"Position {'xyz'[axis]} [m]")

@@ -68,4 +68,4 @@ def scales(axes: Any, points: Array) -> None:
         getattr(axes, f"set_{name}lim")(centre - width, centre + width)
         getattr(axes, f"set_{name}label")(f"{name} [m]", labelpad=8)
         getattr(axes, f"{name}axis").set_major_locator(style.few_ticks())
-    axes.set_box_aspect((1.0, 1.2, 0.8), zoom=0.9)
+    axes.set_box_aspect((1.0, 1.2, 0.8), zoom=0.78)
