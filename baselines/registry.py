@@ -31,6 +31,8 @@ POLICIES: Final[dict[str, type[Any]]] = {
     "random": Random,
 }
 """Classes made with (scenario, gains), the gains being of the class's `Settings`."""
+SLOW: Final = ("mpc",)
+"""Those that solve a program at each step; the report flies them only when they are named."""
 
 
 def make_policy(
