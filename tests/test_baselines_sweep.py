@@ -216,23 +216,20 @@ def test_files_are_complete(folder: Path, episodes: pd.DataFrame) -> None:
 
 
 def test_the_reading_names_who_costs_least() -> None:
-    """Two policies that swap places, one episode each, beside a bound of half of the best cost."""
-    costs = {
-        ("a", 0.1): 2.0,
-        ("a", 10.0): 8.0,
-        ("b", 0.1): 3.0,
-        ("b", 10.0): 6.0,
-        (BOUND, 0.1): 1.0,
-        (BOUND, 10.0): 4.0,
-    }
-    lines = [(FRONT, value, name, 0, cost, 1, False) for (name, value), cost in costs.items()]
-    columns = ["quantity", "value", "policy", "seed", "cost_m_s", "episodes", "ended_early"]
-    rest = [(q, 0.0, name, 0, cost, 1, False) for q in VARIATIONS if q != FRONT for name, cost in (("a", 1), ("b", 2))]
-    table = pd.DataFrame(lines + rest, columns=columns)
-    text = reading(table, table)
+    """Two policies that swap places along the front, and are told apart elsewhere only where each seed agrees."""
+    rows = []
+    for value, a, b, bound in ((0.1, 2.0, 3.0, 1.0), (10.0, 8.0, 6.0, 4.0)):
+        rows += [(FRONT, value, name, 0, cost) for name, cost in (("a", a), ("b", b), (BOUND, bound))]
+    unlike = [(seed, sign * 1.0) for seed, sign in enumerate((1, -1, 1, -1, 1, -1, 1, -1))]
+    for quantity in [name for name in VARIATIONS if name != FRONT]:
+        rows += [(quantity, 0.0, "a", seed, 10.0) for seed, _ in unlike]
+        rows += [(quantity, 0.0, "b", seed, 10.1 + difference) for seed, difference in unlike]
+    episodes = pd.DataFrame(rows, columns=["quantity", "value", "policy", "seed", "cost_m_s"])
+    text = reading(episodes, episodes.assign(episodes=1, ended_early=0))
     assert text[0].endswith("a 2 to 2, b 1.5 to 3 times.")
-    assert text[1].endswith("a costs least at 0.1; b costs least at 10.")
-    assert all(line.endswith("a costs least at every value.") for line in text[2:])
+    assert text[1].endswith(": a at 0.1; b at 10.")
+    assert all(line.endswith(": a or b at every value.") for line in text[2:])
+    assert len(text) == 1 + len(VARIATIONS)
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,11 @@ from markupsafe import Markup
 from plotly.offline import get_plotlyjs
 
 from baselines.report.page import div
-from baselines.report.results import number
+from baselines.report.results import number, significant
 from baselines.sweep.figures import Looks, front_figure, looks_of, robustness_figure
 from baselines.sweep.flights import BOUND
 from baselines.sweep.variations import FRONT, VARIATIONS
+from formation_env.evaluation import paired_difference
 from formation_env.scenario import Scenario
 
 
@@ -63,7 +64,8 @@ def reading(episodes: pd.DataFrame, summary: pd.DataFrame) -> list[str]:
     lines = [*_against_bound(episodes)]
     policies = summary[summary["policy"] != BOUND]
     if policies["policy"].nunique() > 1:
-        lines += [_winners(name, policies[policies["quantity"] == name]) for name in VARIATIONS]
+        flown = episodes[episodes["policy"] != BOUND]
+        lines += [_winners(name, flown[flown["quantity"] == name]) for name in VARIATIONS]
     early = int(policies["ended_early"].sum())
     if early:
         lines.append(f"A limit ended {early} of {int(policies['episodes'].sum())} episodes early.")
@@ -81,18 +83,28 @@ def _against_bound(episodes: pd.DataFrame) -> list[str]:
     return [f"Cost over the bound along the front, on the bound's seeds: {', '.join(spans)} times."]
 
 
-def _winners(quantity: str, summary: pd.DataFrame) -> str:
-    """Which policy costs least, at which values."""
-    best = summary.loc[summary.groupby("value")["cost_m_s"].idxmin()]
-    variation = VARIATIONS[quantity]
-    if best["policy"].nunique() == 1:
-        return f"{_capital(variation.label)}: {best['policy'].iloc[0]} costs least at every value."
-    where = {
-        name: ", ".join(variation.names.get(value, f"{value:g}") for value in group["value"])
-        for name, group in best.groupby("policy", sort=False)
-    }
-    parts = [f"{name} costs least at {values}" for name, values in where.items()]
+def _winners(quantity: str, episodes: pd.DataFrame) -> str:
+    """Who costs least, at which values."""
+    variation, where = VARIATIONS[quantity], dict[str, list[str]]()
+    for value, flown in episodes.groupby("value"):
+        text = variation.names.get(float(str(value)), f"{value:g}")
+        where.setdefault(_cheapest(flown), []).append(text.replace("-", "−"))
+    if len(where) == 1:
+        return f"{_capital(variation.label)}: {next(iter(where))} at every value."
+    parts = [f"{names} at {', '.join(values)}" for names, values in where.items()]
     return f"{_capital(variation.label)}: {'; '.join(parts)}."
+
+
+def _cheapest(flown: pd.DataFrame) -> str:
+    """The policy of least mean cost at a point, and those that its paired interval does not tell from it."""
+    ranking = flown.groupby("policy")["cost_m_s"].mean().sort_values().index
+    tables = [flown[flown["policy"] == name] for name in ranking]
+    near = [
+        str(name)
+        for name, table in zip(ranking[1:], tables[1:], strict=True)
+        if not significant(paired_difference(table, tables[0], "cost_m_s"))
+    ]
+    return " or ".join([str(ranking[0]), *near])
 
 
 def _capital(text: str) -> str:
