@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
+from plotly.colors import hex_to_rgb
 from plotly.subplots import make_subplots
 
 from baselines.report import style
@@ -61,7 +62,8 @@ def robustness_figure(summary: pd.DataFrame, looks: Looks) -> go.Figure:
         panel = summary[summary["quantity"] == quantity]
         for name, line in panel.groupby("policy", sort=False):
             trace = _cost_line(str(name), line, looks[str(name)]).update(showlegend=index == 0)
-            figure.add_trace(trace, row=row + 1, col=column + 1)
+            band = _band(str(name), line, looks[str(name)])
+            figure.add_traces([band, trace], rows=row + 1, cols=column + 1)
         number = "" if index == 0 else str(index + 1)
         _label(figure, number, VARIATIONS[quantity])
         _fit(figure, f"yaxis{number}", panel[["cost_low_m_s", "cost_high_m_s"]].to_numpy(float))
@@ -69,12 +71,20 @@ def robustness_figure(summary: pd.DataFrame, looks: Looks) -> go.Figure:
 
 
 def _cost_line(name: str, line: pd.DataFrame, look: Look) -> go.Scatter:
-    """A policy's cost with whiskers to the ends of the interval."""
-    mean = line["cost_m_s"]
-    above, below = line["cost_high_m_s"] - mean, mean - line["cost_low_m_s"]
-    whisker = {"type": "data", "symmetric": False, "array": above, "arrayminus": below, "thickness": 1.2, "width": 3}
-    trace = go.Scatter(x=line["value"], y=mean, error_y=whisker, mode="lines+markers", name=name, legendgroup=name)
-    return trace.update(_look(look), hovertemplate="%{x:g}: %{y:.4g} m/s")
+    """A policy's mean cost."""
+    ends = line[["cost_low_m_s", "cost_high_m_s"]].to_numpy()
+    trace = go.Scatter(x=line["value"], y=line["cost_m_s"], mode="lines+markers", name=name, legendgroup=name)
+    hover = "%{x:g}: %{y:.4g} [%{customdata[0]:.4g}, %{customdata[1]:.4g}] m/s"
+    return trace.update(_look(look), customdata=ends, hovertemplate=hover)
+
+
+def _band(name: str, line: pd.DataFrame, look: Look) -> go.Scatter:
+    """The interval of a policy's cost, shaded; whiskers of several policies would hide each other."""
+    back = line.iloc[::-1]
+    x, y = pd.concat([line["value"], back["value"]]), pd.concat([line["cost_high_m_s"], back["cost_low_m_s"]])
+    shade = f"rgba{(*hex_to_rgb(look.color), 0.2)}"
+    band = go.Scatter(x=x, y=y, fill="toself", fillcolor=shade, mode="lines", line={"width": 0}, legendgroup=name)
+    return band.update(hoverinfo="skip", showlegend=False)
 
 
 def _look(look: Look) -> dict[str, dict[str, object]]:

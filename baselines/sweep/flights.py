@@ -74,8 +74,8 @@ class Point:
         for seed in self.bound_seeds:
             tables.append(self._solve_bound(seed))
             progress(self.flown.num_steps)
-        point = {"env": self.env, "quantity": self.quantity, "value": self.value}
-        return pd.concat(tables, ignore_index=True).assign(**point)[COLUMNS]
+        table = pd.concat(tables, ignore_index=True)
+        return table.assign(env=self.env, quantity=self.quantity, value=self.value)[COLUMNS]
 
     def _fly_policy(self, name: str) -> pd.DataFrame:
         policy = make_policy(name, self.believed, gains_path(self.original))
