@@ -1,6 +1,7 @@
 """The sweep: each variation changes what it says, all fly the same seeds, the bound lies below, files are complete."""
 
 import json
+import sys
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -246,6 +247,15 @@ def test_a_mistake_is_one_line(arguments: list[str], named: str, tmp_path: Path)
     assert run.exit_code == 2
     assert named in run.stderr
     assert run.stderr.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_missing_solver_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the extra of the bound the command says what to install, before it flies."""
+    monkeypatch.setitem(sys.modules, "clarabel", None)
+    run = CliRunner().invoke(app, ["sweep", "keeping", "--out", str(tmp_path)])
+    assert run.exit_code == 1
+    assert run.stderr == "sweep: needs clarabel; install it with: pip install 'formation-env[optimal]'\n"
     assert not list(tmp_path.iterdir())
 
 

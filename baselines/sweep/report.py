@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
@@ -64,6 +65,8 @@ def write_sweep(envs: Sequence[Environment], wanted: Wanted, out: Path, command:
     scenarios, seeds = name_environments(envs), seeds_of("test", wanted.episodes)
     policies = tuple(dict.fromkeys(wanted.policies))
     work = points(scenarios, policies, seeds, wanted.bound_episodes)
+    if any(job.bound_seeds for job in work.values()):
+        import_module("clarabel")  # that it is missing should be known before the flights, not after
     first = "flying (the very first run compiles the kernel)"
     with tqdm(
         total=sum(job.cost for job in work.values()), desc=first, unit="step", unit_scale=True, dynamic_ncols=True
