@@ -43,6 +43,8 @@ def front_figure(summary: pd.DataFrame, looks: Looks) -> go.Figure:
     figure.update_yaxes(style.axis("mean position error in hold, m"))
     for axis, column in (("xaxis", "delta_v_m_s"), ("yaxis", "position_error_mean_m")):
         _fit(figure, axis, front[column].to_numpy(float))
+        if figure.layout[axis].type == "log":
+            figure.layout[axis].dtick = "D2"  # labels at 1, 2 and 5: there is room for them
     return figure.update_layout(legend={"orientation": "h", "x": 0, "y": -0.16, "yanchor": "top"})
 
 
