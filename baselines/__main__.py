@@ -2,7 +2,7 @@
 
 import typer
 
-from baselines.commands import report, reproduce
+from baselines.commands import report, reproduce, sweep
 from baselines.picture import render
 from baselines.tuning import tune
 
@@ -10,6 +10,7 @@ app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False)
 app.command()(tune)
 app.command()(report)
 app.command()(reproduce)
+app.command()(sweep)
 app.command()(render)
 
 if __name__ == "__main__":

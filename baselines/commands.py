@@ -1,4 +1,4 @@
-"""The commands `report` and `reproduce`. Their libraries are imported only when they run."""
+"""The commands `report`, `reproduce` and `sweep`. Their libraries are imported only when they run."""
 
 import os
 import shlex
@@ -77,6 +77,28 @@ def reproduce(
     _run("reproduce", out, write)
 
 
+def sweep(
+    scenarios: Annotated[list[str] | None, typer.Argument(help="Ids, names or YAML files, as --env.")] = None,
+    env: Envs = None,
+    policy: Policies = None,
+    episodes: Annotated[int, typer.Option(min=1, help="Test seeds of each point.")] = 20,
+    bound_episodes: Annotated[int, typer.Option(min=0, help="Of these, seeds of the bound's front; 0 is none.")] = 5,
+    out: Out = Path("reports/sweep"),
+    processes: Annotated[int, typer.Option(min=1, help="To fly in.")] = min(2, os.cpu_count() or 1),
+) -> None:
+    """Draw thrust against error as its price moves, and cost against noise, outages, limits and wrong models."""
+    command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
+    envs = [*(scenarios or ()), *(env or ())] or list(ENV_IDS)
+
+    def write() -> Path:
+        from baselines.sweep.report import Wanted, write_sweep
+
+        wanted = Wanted(tuple(policy or Wanted.policies), episodes, bound_episodes)
+        return write_sweep(envs, wanted, out, command, processes)
+
+    _run("sweep", out, write)
+
+
 def _run(name: str, out: Path, write: Callable[[], Path]) -> None:
     """Write a report, and end the program with one line if that fails.
 
@@ -94,7 +116,9 @@ def _run(name: str, out: Path, write: Callable[[], Path]) -> None:
     except KeyboardInterrupt:
         _end(f"{name}: interrupted, nothing written", 130)
     except ModuleNotFoundError as error:
-        _end(f"{name}: needs {str(error.name).split('.')[0]}; install it with: pip install 'formation-env[report]'", 1)
+        missing = str(error.name).split(".")[0]
+        extra = "optimal" if missing == "clarabel" else "report"
+        _end(f"{name}: needs {missing}; install it with: pip install 'formation-env[{extra}]'", 1)
     except ConfigError as error:
         _end(str(error), 2)
     except OSError as error:

@@ -86,7 +86,7 @@ def _section(index: int, results: Results, looks: Looks, data: dict[str, Any]) -
         "rows": [_row(results, name) for name in results.ranking],
         "versus": results.best,
         "bound": None if results.bounds is None else number(float(results.bounds.mean())),
-        "figures": {key: _div(figure, f"{key}-{index}") for key, figure in figures.items()},
+        "figures": {key: div(figure, f"{key}-{index}") for key, figure in figures.items()},
         "zero_thrust": any((table["delta_v_m_s"] <= 0).any() for table in flown.episodes.values()),
         "hidden": results.hidden,
         "flight_seed": flown.flight_seed,
@@ -153,7 +153,7 @@ def _flight(results: Results, name: str) -> dict[str, str]:
     }
 
 
-def _div(figure: Figure, name: str) -> Markup:
+def div(figure: Figure, name: str) -> Markup:
     """A figure as an HTML element with its data; plotly.js stands once in the page's head."""
     config = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"]}
     html = plotly.io.to_html(figure, full_html=False, include_plotlyjs=False, div_id=name, config=config)

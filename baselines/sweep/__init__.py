@@ -1,0 +1,1 @@
+"""How costs move: the front of thrust against error, and robustness against what differs from the plan."""

@@ -1,0 +1,163 @@
+"""What is flown for a sweep, and what comes of it: one line per episode."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+import pandas as pd
+from pydantic import ValidationError
+
+from baselines.fuel import fuel_optimal
+from baselines.registry import gains_path, make_policy
+from baselines.sweep.variations import FRONT, VARIATIONS
+from formation_env.dynamics import NONLINEAR
+from formation_env.dynamics.base import Array
+from formation_env.evaluation import bootstrap_interval, evaluate
+from formation_env.scenario import Scenario
+from formation_env.schedule import FIELDS, OFFSETS, build_schedule
+from formation_env.settings import ConfigError
+
+BOUND: Final = "bound"
+"""Stands for a policy in the tables of the front."""
+KEYS: Final = ["env", "quantity", "value", "policy"]
+METRICS: Final = ["cost_m_s", "delta_v_m_s", "position_error_mean_m"]
+COLUMNS: Final = [*KEYS, "seed", *METRICS, "ended_early"]
+
+
+@dataclass(frozen=True)
+class Point:
+    """One value of one quantity on one environment, flown by all policies on the same seeds.
+
+    Attributes:
+        env: name of the environment.
+        quantity: what is varied.
+        value: of the quantity.
+        flown: the scenario.
+        believed: the scenario that policies are made for.
+        original: the scenario that was varied; its gains are used throughout.
+        policies: their names.
+        seeds: one per episode.
+        bound_seeds: those on which the bound is solved, too.
+    """
+
+    env: str
+    quantity: str
+    value: float
+    flown: Scenario
+    believed: Scenario
+    original: Scenario
+    policies: tuple[str, ...]
+    seeds: tuple[int, ...]
+    bound_seeds: tuple[int, ...] = ()
+
+    @property
+    def cost(self) -> int:
+        """How long it takes, in steps."""
+        return self.flown.num_steps * (len(self.policies) + len(self.bound_seeds))
+
+    def fly(self, progress: Callable[[int], Any]) -> pd.DataFrame:
+        """Fly it; progress is called with the cost of what was flown since the last call.
+
+        Returns:
+            One line per policy and seed: `COLUMNS`.
+
+        Raises:
+            ConfigError: a policy cannot be made.
+            RuntimeError: the bound's solver failed.
+            ModuleNotFoundError: Clarabel is not installed, and the bound is wanted.
+        """
+        tables = []
+        for name in self.policies:
+            tables.append(self._fly_policy(name))
+            progress(self.flown.num_steps)
+        for seed in self.bound_seeds:
+            tables.append(self._solve_bound(seed))
+            progress(self.flown.num_steps)
+        table = pd.concat(tables, ignore_index=True)
+        return table.assign(env=self.env, quantity=self.quantity, value=self.value)[COLUMNS]
+
+    def _fly_policy(self, name: str) -> pd.DataFrame:
+        policy = make_policy(name, self.believed, gains_path(self.original))
+        flown = evaluate(policy, self.flown, self.seeds)
+        early = flown["steps"] < self.flown.num_steps
+        return flown.assign(policy=name, cost_m_s=-flown["return"], ended_early=early)
+
+    def _solve_bound(self, seed: int) -> pd.DataFrame:
+        plan = fuel_optimal(self.flown, seed=seed)
+        error_m = mean_hold_error_m(self.flown, plan.states)
+        line = (BOUND, seed, plan.cost, plan.delta_v_m_s, error_m, False)
+        return pd.DataFrame([line], columns=["policy", "seed", *METRICS, "ended_early"])
+
+
+def mean_hold_error_m(scenario: Scenario, states: Array) -> float:
+    """Mean position error of the hold, m, as the environment counts it.
+
+    Args:
+        scenario: what is flown.
+        states: LVLH states (steps + 1, 6), m and m/s.
+    """
+    schedule, first = build_schedule(scenario), OFFSETS["scored_position"]
+    goal, counts = schedule[:, first : first + FIELDS["scored_position"]], schedule[:, OFFSETS["counts"]]
+    error_m = np.linalg.norm(states[:, :3] - goal, axis=1)
+    return float(counts @ error_m / counts.sum())
+
+
+def points(
+    scenarios: Mapping[str, Scenario], policies: Sequence[str], seeds: Sequence[int], bound_episodes: int
+) -> dict[str, Point]:
+    """All that a sweep flies, by name.
+
+    Args:
+        scenarios: label -> environment.
+        policies: names.
+        seeds: one per episode, the same everywhere.
+        bound_episodes: how many of the seeds the bound is solved on, along the front; none where the truth is
+            nonlinear.
+
+    Raises:
+        ConfigError: a price of errors of 0, or a scenario that a variation does not fit.
+    """
+    made = {}
+    for env, scenario in scenarios.items():
+        if scenario.reward.error_weight == 0:
+            raise ConfigError(f"sweep: {env}: reward.error_weight: must be > 0 for a front, got 0")
+        solved = tuple(seeds)[:bound_episodes] if scenario.dynamics != NONLINEAR else ()
+        for quantity, value, flown, believed in _varied(env, scenario):
+            made[f"{env} {quantity} {value:g}"] = Point(
+                env=env,
+                quantity=quantity,
+                value=value,
+                flown=flown,
+                believed=believed,
+                original=scenario,
+                policies=tuple(policies),
+                seeds=tuple(seeds),
+                bound_seeds=solved if quantity == FRONT else (),
+            )
+    return made
+
+
+def _varied(env: str, scenario: Scenario) -> Iterator[tuple[str, float, Scenario, Scenario]]:
+    for quantity, variation in VARIATIONS.items():
+        for value in variation.values:
+            try:
+                flown, believed = variation.vary(scenario, value)
+            except ValidationError as error:
+                fault = error.errors()[0]["msg"].removeprefix("Value error, ")
+                raise ConfigError(f"sweep: {env}: {quantity} = {value:g}: {fault}") from None
+            yield quantity, value, flown, believed
+
+
+def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
+    """Means of each point and policy, the cost's with its 95 % interval.
+
+    Returns:
+        One line each: `KEYS`, episodes, ended_early (how many), the means of `METRICS`, low and high of the cost.
+    """
+    lines = []
+    for key, group in episodes.groupby(KEYS, sort=False):
+        means = [float(group[metric].mean()) for metric in METRICS]
+        interval = bootstrap_interval(group["cost_m_s"].to_numpy(float))
+        lines.append((*key, len(group), int(group["ended_early"].sum()), *means, *interval))
+    return pd.DataFrame(lines, columns=[*KEYS, "episodes", "ended_early", *METRICS, "cost_low_m_s", "cost_high_m_s"])
