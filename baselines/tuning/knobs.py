@@ -19,12 +19,14 @@ class Knob:
         low: least value, in the gain's unit.
         high: greatest value.
         log: whether its decades are searched evenly, else its values.
+        transfer: whether it matters to transfers only.
     """
 
     keys: tuple[str, ...]
     low: float
     high: float
     log: bool = True
+    transfer: bool = False
 
     @property
     def name(self) -> str:
@@ -32,20 +34,20 @@ class Knob:
         return self.keys[0]
 
 
-def _regulator(section: str) -> tuple[Knob, ...]:
+def _regulator(section: str, transfer: bool) -> tuple[Knob, ...]:
     """Weights of a regulator: along-track and cross-track position weights stay 1, since only ratios matter."""
     return (
-        Knob((f"{section}.position.0",), 1e-2, 1e2),
-        Knob((f"{section}.velocity_s2.0", f"{section}.velocity_s2.1"), 1e2, 1e8),
-        Knob((f"{section}.velocity_s2.2",), 1e2, 1e8),
-        Knob((f"{section}.control_s2.0", f"{section}.control_s2.1"), 1, 1e8),
-        Knob((f"{section}.control_s2.2",), 1, 1e8),
+        Knob((f"{section}.position.0",), 1e-2, 1e2, transfer=transfer),
+        Knob((f"{section}.velocity_s2.0", f"{section}.velocity_s2.1"), 1e2, 1e8, transfer=transfer),
+        Knob((f"{section}.velocity_s2.2",), 1e2, 1e8, transfer=transfer),
+        Knob((f"{section}.control_s2.0", f"{section}.control_s2.1"), 1, 1e8, transfer=transfer),
+        Knob((f"{section}.control_s2.2",), 1, 1e8, transfer=transfer),
     )
 
 
 KNOBS: Final[dict[str, tuple[Knob, ...]]] = {
     "lqr": (Knob(("expected_cost.floor",), 1e-5, 1e-2), Knob(("expected_cost.price_scale",), 0.3, 3.0)),
-    "lqr_tracking": (*_regulator("transfer"), *_regulator("hold")),
+    "lqr_tracking": (*_regulator("transfer", transfer=True), *_regulator("hold", transfer=False)),
     "smc": (
         *(Knob((f"surface.decay_per_s.{axis}",), 3e-5, 3e-2) for axis in range(3)),
         Knob(("reaching.eps_m_s",), 1e-4, 1),
@@ -53,13 +55,13 @@ KNOBS: Final[dict[str, tuple[Knob, ...]]] = {
         Knob(("boundary_m",), 0.1, 1e4),
     ),
 }
-"""Policy -> its knobs. Those of a transfer are left out where there is none."""
+"""Policy -> its knobs."""
 
 
 def knobs_for(policy: str, scenario: Scenario) -> tuple[Knob, ...]:
     """The knobs of a policy that matter to a scenario."""
     transfers = any(scenario.steps(phase.transfer_periods) for phase in scenario.phases)
-    return tuple(knob for knob in KNOBS[policy] if transfers or not knob.name.startswith("transfer"))
+    return tuple(knob for knob in KNOBS[policy] if transfers or not knob.transfer)
 
 
 def first_gains(policy: str) -> dict[str, Any]:

@@ -85,7 +85,8 @@ def costs(policies: Sequence[Policy], scenario: Scenario, episode_seeds: Sequenc
     at_once = max(1, MAX_ROWS // len(episode_seeds))
     groups = [policies[i : i + at_once] for i in range(0, len(policies), at_once)]
     flown = [evaluate(SideBySide(group), scenario, [*episode_seeds] * len(group))["return"] for group in groups]
-    return -np.concatenate(flown).reshape(len(policies), -1).mean(axis=1)
+    per_policy: Array = -np.concatenate(flown).reshape(len(policies), -1).mean(axis=1)
+    return per_policy
 
 
 def search(task: Task, trials: int, journal: Path, progress: Callable[[int], Any] = lambda count: None) -> Found:
@@ -111,8 +112,9 @@ def search(task: Task, trials: int, journal: Path, progress: Callable[[int], Any
         add(study, task.knobs, batch, task.costs(batch))
         known = study.get_trials(deepcopy=False)[:trials]
         progress(len(batch))
-    best = min(known, key=lambda trial: trial.value)
-    return Found(turn(task.gains, task.knobs, best.params), best.value, known[0].value, best.number)
+    values = [float(trial.values[0]) for trial in known]
+    best = known[int(np.argmin(values))]
+    return Found(turn(task.gains, task.knobs, best.params), min(values), values[0], best.number)
 
 
 def candidates(task: Task, before: Sequence["FrozenTrial"]) -> list[dict[str, float]]:
