@@ -49,7 +49,7 @@ $(BASE):
 
 $(REPORT): $(INPUTS) | $(BASE)
 	rm -f $(REPORT) $(TEST)
-	$(INSTALL) '.[report]'
+	$(INSTALL) '.[report,optimal]'
 	touch $@
 
 # The test extras include the report's, so this set-up stands for both.

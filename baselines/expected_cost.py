@@ -16,7 +16,7 @@ from typing import Final
 import numpy as np
 
 from baselines.kalman import measurement
-from baselines.riccati import OVERLOAD, time_varying_gains
+from baselines.riccati import OVERLOAD, time_varying_regulator
 from baselines.timeline import start_error
 from formation_env.dynamics.base import Array, DiscreteModel
 from formation_env.estimation import process_noise_covariance
@@ -106,11 +106,31 @@ def _rms_position(estimated: Array, missed: Array) -> float:
     return float(np.sqrt((estimated.diagonal() + missed.diagonal())[:3].sum()))
 
 
-@lru_cache(maxsize=32)
+@dataclass(frozen=True)
+class PhaseDesign:
+    """A phase's regulator.
+
+    Attributes:
+        gains: K (steps, 3, 6) of u = -K (x_hat - reference).
+        stiffness: (steps, 3, 3), see `riccati.time_varying_regulator`; the cost's unit is m/s.
+    """
+
+    gains: Array
+    stiffness: Array
+
+
 def expected_cost_gains(
     scenario: Scenario, rounds: int = 30, floor: float = 3e-4, price_scale: float = 1.0
 ) -> tuple[Array, ...]:
-    """Gains (steps, 3, 6) of each phase, of u = -K (x_hat - reference).
+    """Gains (steps, 3, 6) of each phase, see `expected_cost_design`."""
+    return tuple(design.gains for design in expected_cost_design(scenario, rounds, floor, price_scale))
+
+
+@lru_cache(maxsize=32)
+def expected_cost_design(
+    scenario: Scenario, rounds: int = 30, floor: float = 3e-4, price_scale: float = 1.0
+) -> tuple[PhaseDesign, ...]:
+    """The regulator of each phase.
 
     Each phase is judged by itself; its start is the nominal one with the second moment that the phase before ends with.
 
@@ -126,13 +146,14 @@ def expected_cost_gains(
         instants = slice(leg.start, leg.end + 1)
         here = Knowledge(known.missed[instants], known.learned[instants])
         start = start_error(scenario, leg)
-        gains, first = _phase_gains(scenario, leg, start, first, here, rounds, floor, price_scale)
-        gains.setflags(write=False)
-        result.append(gains)
+        design, first = _design(scenario, leg, start, first, here, rounds, floor, price_scale)
+        for part in (design.gains, design.stiffness):
+            part.setflags(write=False)
+        result.append(design)
     return tuple(result)
 
 
-def _phase_gains(
+def _design(
     scenario: Scenario,
     leg: Leg,
     start: Array,
@@ -141,20 +162,20 @@ def _phase_gains(
     rounds: int,
     floor: float,
     price_scale: float,
-) -> tuple[Array, Array]:
-    """Gains of a phase, and the second moment (6, 6) of the estimated error at its end."""
+) -> tuple[PhaseDesign, Array]:
+    """The regulator of a phase, and the second moment (6, 6) of the estimated error at its end."""
     limit, position = scenario.spacecraft.max_accel_m_s2, np.diag([1.0, 1, 1, 0, 0, 0])
     model = scenario.filter_model().steps(leg.start, leg.end)
     price = price_scale * _error_price(scenario, leg)
     control_weight, error_weight = np.full(leg.end - leg.start, scenario.dt_s / limit), price / FIRST_ERROR_M
     for _ in range(rounds + 1):
         Q, R = error_weight[:, None, None] * position, control_weight[:, None, None] * np.eye(3)
-        gains = time_varying_gains(model.Phi, model.Gamma, Q, R)
+        gains, stiffness = time_varying_regulator(model.Phi, model.Gamma, Q, R)
         seen = spread(model, gains, start, first, known)
         overload = 1 + OVERLOAD * np.maximum(seen.peak / limit - 1, 0)
         control_weight = np.sqrt(control_weight * scenario.dt_s * overload / (seen.control + floor * limit))
         error_weight = np.sqrt(error_weight * price * _steepness(scenario, seen.error))
-    return gains, seen.last
+    return PhaseDesign(gains, stiffness), seen.last
 
 
 def _error_price(scenario: Scenario, leg: Leg) -> Array:
@@ -170,3 +191,19 @@ def _steepness(scenario: Scenario, error_m: Array) -> Array:
     if scenario.reward.shape == "quadratic":
         return np.full(error_m.shape, 1 / scenario.reward.quadratic_scale_m)
     return 1 / (error_m + ERROR_FLOOR_M)
+
+
+def episode_scatter(scenario: Scenario) -> tuple[Array, Array]:
+    """How far an episode scatters about its mean under `expected_cost_gains`.
+
+    Returns:
+        Root mean squares of the true position error (num_steps + 1,), m, and of the acceleration (num_steps,), m/s^2.
+    """
+    known = knowledge(scenario, scenario.filter_model())
+    first, error, control = known.learned[0], np.zeros(scenario.num_steps + 1), np.zeros(scenario.num_steps)
+    for leg, gains in zip(legs(scenario), expected_cost_gains(scenario), strict=True):
+        instants = slice(leg.start, leg.end + 1)
+        here = Knowledge(known.missed[instants], known.learned[instants])
+        seen = spread(scenario.filter_model().steps(leg.start, leg.end), gains, np.zeros(6), first, here)
+        error[instants], control[leg.start : leg.end], first = seen.error, seen.control, seen.last
+    return error, control

@@ -14,12 +14,11 @@ from functools import lru_cache
 from typing import Final, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from baselines.expected_cost import expected_cost_gains
 from baselines.policy import Observations
 from baselines.riccati import closed_loop, least_fuel_gains
-from baselines.timeline import by_steps_left, nominal_start, start_error, transfer_reference
+from baselines.timeline import Instants, by_steps_left, nominal_start, start_error, transfer_reference
 from baselines.transfers import two_impulse
 from formation_env.dynamics.base import Array, DiscreteModel
 from formation_env.scenario import Scenario
@@ -44,7 +43,7 @@ class Tracking:
     """
 
     error: Array
-    at: tuple[NDArray[np.intp], NDArray[np.intp]]
+    at: Instants
 
 
 class Guidance:

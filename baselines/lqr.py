@@ -4,10 +4,11 @@ from functools import lru_cache
 from typing import Annotated, Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, Strict, model_validator
 
-from baselines.expected_cost import expected_cost_gains
-from baselines.guidance import Guidance, Guide, desired_path
+from baselines.expected_cost import PhaseDesign, expected_cost_design
+from baselines.guidance import Guidance, Guide, Tracking, desired_path
 from baselines.policy import AccelerationPolicy, Observations
 from baselines.riccati import finite_horizon_gains, least_fuel_gains, stationary
 from baselines.timeline import by_steps_left, nominal_start
@@ -15,7 +16,7 @@ from baselines.weights import Weights
 from formation_env.dynamics.base import Array
 from formation_env.scenario import Scenario
 from formation_env.schedule import Leg
-from formation_env.settings import Flag, Positive, settings
+from formation_env.settings import Flag, NonNegative, Positive, settings
 
 Rounds = Annotated[int, Strict(), Field(ge=0, le=100)]
 
@@ -62,6 +63,8 @@ class LQRSettings:
             `transfer`.
         guidance: the desired path, see `baselines.guidance`; `expected_cost` finds the way by itself.
         feedforward: whether the thrust that the desired path itself takes is added.
+        deadband: design `expected_cost`: the follower coasts while a thrust would take off less than this times itself
+            from the cost to come; 0 is none, 1 is what thrust costs.
         expected_cost: for that design.
         hold: weights in hold.
         transfer: how transfers are flown.
@@ -70,6 +73,7 @@ class LQRSettings:
     design: Literal["expected_cost", "weights"] = "expected_cost"
     guidance: Guide = "automatic"
     feedforward: Flag = True
+    deadband: NonNegative = 0.0
     expected_cost: ExpectedCostSettings = ExpectedCostSettings()
     hold: Weights = Weights(velocity_s2=(1e5, 1e5, 1e5), control_s2=(3e5, 3e5, 3e5))
     transfer: TransferSettings = TransferSettings()
@@ -78,6 +82,8 @@ class LQRSettings:
     def _check(self) -> Self:
         if self.design == "expected_cost" and self.guidance != "automatic":
             raise ValueError(f"guidance: must be automatic with design expected_cost, got {self.guidance!r}")
+        if self.design == "weights" and self.deadband > 0:
+            raise ValueError(f"deadband: must be 0 with design weights, whose cost has no unit, got {self.deadband:g}")
         return self
 
 
@@ -91,6 +97,8 @@ class LQR(AccelerationPolicy):
         self.gains = gains
         self._guidance = Guidance(scenario, gains.guidance)
         model = scenario.filter_model()
+        if gains.deadband > 0:
+            self._stiffness = by_steps_left(scenario, lambda leg: _design(scenario, gains)[leg.index].stiffness)
         self.K = by_steps_left(scenario, lambda leg: phase_gains(scenario, leg, gains))
         to_accel = by_steps_left(scenario, lambda leg: np.linalg.pinv(model.steps(leg.start, leg.end).Gamma))
         self._own_thrust = gains.feedforward * (to_accel @ self._guidance.residuals[..., None])[..., 0]
@@ -98,20 +106,33 @@ class LQR(AccelerationPolicy):
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
         now = self._guidance.track(observation)
-        return self._own_thrust[now.at] - (self.K[now.at] @ now.error[..., None])[..., 0]
+        acceleration: Array = self._own_thrust[now.at] - (self.K[now.at] @ now.error[..., None])[..., 0]
+        return np.where(self._pays(acceleration, now)[..., None], acceleration, 0.0)
+
+    def _pays(self, acceleration: Array, now: Tracking) -> NDArray[np.bool_]:
+        """Whether the first bit of an acceleration (..., 3) takes off more from the cost to come than the deadband."""
+        if self.gains.deadband == 0:
+            return np.ones(acceleration.shape[:-1], bool)
+        slope = (self._stiffness[now.at] @ acceleration[..., None])[..., 0]
+        return np.asarray(np.linalg.norm(slope, axis=-1) > self.gains.deadband * self.scenario.dt_s)
 
 
 def phase_gains(scenario: Scenario, leg: Leg, gains: LQRSettings) -> Array:
     """Gains (steps, 3, 6) of a phase, from its beginning on."""
     if gains.design == "expected_cost":
-        wanted = gains.expected_cost
-        return expected_cost_gains(scenario, wanted.rounds, wanted.floor, wanted.price_scale)[leg.index]
+        return _design(scenario, gains)[leg.index].gains
     hold = _regulator(scenario, gains.hold)[leg.arrival : leg.end]
     if gains.transfer.horizon == "infinite":
         transfer = _regulator(scenario, gains.transfer.weights)[leg.start : leg.arrival]
     else:
         transfer = transfer_gains(scenario, leg, gains.guidance, gains.transfer)
     return np.concatenate([transfer, hold])
+
+
+def _design(scenario: Scenario, gains: LQRSettings) -> tuple[PhaseDesign, ...]:
+    """The regulators of least expected cost."""
+    wanted = gains.expected_cost
+    return expected_cost_design(scenario, wanted.rounds, wanted.floor, wanted.price_scale)
 
 
 @lru_cache(maxsize=8)

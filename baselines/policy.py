@@ -47,3 +47,8 @@ class AccelerationPolicy(ABC):
         """
         accelerations = self.acceleration(np.asarray(observation, np.float32))
         return np.clip(accelerations / self._max_accel_m_s2, -1.0, 1.0).astype(np.float32), state
+
+    def within_limit(self, accelerations: Array) -> Array:
+        """Accelerations (..., 3), m/s^2, shortened so that no axis is beyond the limit; their directions stay."""
+        excess = np.abs(accelerations).max(axis=-1, keepdims=True) / self._max_accel_m_s2
+        return accelerations / np.maximum(excess, 1.0)

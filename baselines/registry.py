@@ -5,11 +5,15 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
 
+from baselines.deadband import Deadband
 from baselines.floors import Random, Zero
 from baselines.lqr import LQR
+from baselines.lqr_finite import LQRFinite
 from baselines.lqr_tracking import LQRTracking
+from baselines.mpc import MPC
 from baselines.policy import AccelerationPolicy
 from baselines.smc import SMC
+from baselines.two_impulse import TwoImpulsePolicy
 from formation_env.envs import ENV_IDS
 from formation_env.evaluation import scenario_of
 from formation_env.scenario import Scenario, config_folder, load_scenario, scenario_names
@@ -17,12 +21,18 @@ from formation_env.settings import ConfigError, build, load_yaml, nearest
 
 POLICIES: Final[dict[str, type[Any]]] = {
     "lqr": LQR,
+    "mpc": MPC,
+    "lqr_finite": LQRFinite,
     "lqr_tracking": LQRTracking,
     "smc": SMC,
+    "two_impulse": TwoImpulsePolicy,
+    "deadband": Deadband,
     "zero": Zero,
     "random": Random,
 }
 """Classes made with (scenario, gains), the gains being of the class's `Settings`."""
+SLOW: Final = ("mpc",)
+"""Those that solve a program at each step; the report flies them only when they are named."""
 
 
 def make_policy(

@@ -108,7 +108,12 @@ def finite_horizon_gains(Phi: Array, Gamma: Array, Q: Array, R: Array, terminal:
 
 
 def time_varying_gains(Phi: Array, Gamma: Array, Q: Array, R: Array) -> Array:
-    """Gains of a finite horizon by the backward Riccati recursion.
+    """Gains (steps, 3, 6) of a finite horizon, see `time_varying_regulator`."""
+    return time_varying_regulator(Phi, Gamma, Q, R)[0]
+
+
+def time_varying_regulator(Phi: Array, Gamma: Array, Q: Array, R: Array) -> tuple[Array, Array]:
+    """Gains and stiffnesses of a finite horizon by the backward Riccati recursion.
 
     Args:
         Phi: state transition matrix (6, 6), or of each step (steps, 6, 6).
@@ -117,18 +122,21 @@ def time_varying_gains(Phi: Array, Gamma: Array, Q: Array, R: Array) -> Array:
         R: control weights (steps, 3, 3).
 
     Returns:
-        Gains (steps, 3, 6), from the first step on.
+        Gains K (steps, 3, 6), from the first step on, and R + Gamma' P Gamma (steps, 3, 3): that times K x is what a
+        first bit of control takes off the cost to come, so long as there is none.
     """
     gains, (Phis, Gammas) = np.zeros((len(R), 3, 6)), per_step(Phi, Gamma, len(R))
+    stiffness = np.zeros((len(R), 3, 3))
     P = Q[-1]
     for step in reversed(range(len(R))):
         F, G = Phis[step], Gammas[step]
         PG = P @ G
+        stiffness[step] = R[step] + G.T @ PG
         # K = (R + Gamma' P Gamma)^-1 Gamma' P Phi;  P <- Phi' P (Phi - Gamma K) + Q
-        gains[step] = np.linalg.solve(R[step] + G.T @ PG, PG.T @ F)
+        gains[step] = np.linalg.solve(stiffness[step], PG.T @ F)
         P = F.T @ P @ (F - G @ gains[step]) + Q[step]
         P = (P + P.T) / 2
-    return gains
+    return gains, stiffness
 
 
 def per_step(Phi: Array, Gamma: Array, steps: int) -> tuple[Array, Array]:

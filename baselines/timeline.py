@@ -3,10 +3,14 @@
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from formation_env.dynamics.base import Array
 from formation_env.scenario import Scenario
 from formation_env.schedule import Leg, leg_reference, legs
+
+Instants = tuple[NDArray[np.intp], NDArray[np.intp]]
+"""Phases (...) and steps left to their ends (...), which index the tables of `by_steps_left`."""
 
 
 def by_steps_left(scenario: Scenario, values: Callable[[Leg], Array]) -> Array:

@@ -23,13 +23,15 @@ from formation_env.evaluation import evaluate
 from formation_env.seeds import seeds
 from formation_env.settings import ConfigError, build
 
-BOTTOM = {"expected_cost.floor": 7e-4, "expected_cost.price_scale": 0.6}
+BOTTOM = {"expected_cost.floor": 7e-4, "expected_cost.price_scale": 0.6, "deadband": 0.3}
 """Where the bowl has its least value, 0."""
 
 
 def bowl(self: Task, batch: list[dict[str, float]]) -> Array:
-    """Squared distances from the bottom, in decades: a cost in closed form for `lqr`."""
-    return np.array([sum(np.log10(each[name] / BOTTOM[name]) ** 2 for name in BOTTOM) for each in batch])
+    """Squared distances from the bottom, in decades, or as they are: a cost in closed form for `lqr`."""
+    log = {knob.name: knob.log for knob in self.knobs}
+    off = [[np.log10(each[k] / at) if log[k] else each[k] - at for k, at in BOTTOM.items()] for each in batch]
+    return (np.array(off) ** 2).sum(axis=1)
 
 
 @pytest.fixture
@@ -95,11 +97,11 @@ def test_knobs_of_a_transfer_are_for_transfers() -> None:
 def test_search_finds_the_bottom(lqr: Task, tmp_path: Path) -> None:
     """TPE gets far nearer to a known bottom than chance.
 
-    The knobs span 3 decades by 1, so one of 150 random points has a squared distance below d with probability
-    1 - exp(-150 pi d / 3): 5 % for the bound.
+    The knobs span 3 decades by 1 by 1, so the nearest of 150 random points is within r with probability
+    1 - exp(-150 (4/3 pi r^3) / 3): 5 % for the bound.
     """
     found = search(lqr, 150, tmp_path / "j")
-    assert found.cost < -np.log(0.95) * 3 / (150 * np.pi)
+    assert found.cost < (-np.log(0.95) * 3 / 150 / (4 / 3 * np.pi)) ** (2 / 3)
     (reached,) = bowl(lqr, [read(found.gains, lqr.knobs)])
     # the gains are those of the best trial, to three digits: half a percent is 0.002 decades
     assert abs(np.sqrt(reached) - np.sqrt(found.cost)) < 0.004

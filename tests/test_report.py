@@ -65,7 +65,21 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_all_files_and_nothing_else_are_written(folder: Path) -> None:
     """What the command promises, without temporaries."""
-    assert sorted(path.name for path in folder.iterdir()) == sorted(FILES)
+    assert sorted(path.name for path in folder.iterdir()) == sorted((*FILES, "bounds"))
+    assert len([*(folder / "bounds").iterdir()]) == 2 * EPISODES
+
+
+def test_policies_are_held_against_the_bound(folder: Path) -> None:
+    """The regret in the data is the mean of cost over bound of the tables, and no policy gets below the bound."""
+    data = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    episodes = pd.read_csv(folder / "episodes.csv").set_index(["env", "policy", "seed"]).sort_index()
+    for env, found in data["environments"].items():
+        assert len(found["bounds"]) == EPISODES
+        for policy, line in found["policies"].items():
+            ratios = -episodes.loc[(env, policy), "return"].to_numpy() / np.array(found["bounds"])
+            assert line["regret"]["mean"] == pytest.approx(ratios.mean(), rel=1e-9)
+            assert (ratios > 1).all()
+    assert "over bound" in (folder / "report.html").read_text(encoding="utf-8")
 
 
 def test_one_line_per_environment_policy_and_seed(folder: Path) -> None:

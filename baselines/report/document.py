@@ -14,7 +14,18 @@ import numpy as np
 import formation_env
 from baselines.report.results import Interval, Results
 
-LIBRARIES = ("numpy", "scipy", "numba", "gymnasium", "pandas", "control", "plotly", "stable-baselines3", "torch")
+LIBRARIES = (
+    "numpy",
+    "scipy",
+    "numba",
+    "gymnasium",
+    "pandas",
+    "control",
+    "clarabel",
+    "plotly",
+    "stable-baselines3",
+    "torch",
+)
 """Their versions are noted, where they are installed."""
 
 
@@ -48,6 +59,7 @@ def _environment(results: Results) -> dict[str, Any]:
         "num_steps": flown.scenario.num_steps,
         "flight_seed": flown.flight_seed,
         "ranking": results.ranking,
+        "bounds": results.bounds,
         "policies": {name: _policy(results, name) for name in flown.episodes},
     }
 
@@ -57,6 +69,7 @@ def _policy(results: Results, name: str) -> dict[str, Any]:
     return {
         "settings": results.flown.settings.get(name),
         "ended_early": results.ended_early(name),
+        "regret": _interval(results.regrets[name]) if name in results.regrets else None,
         "summary": {str(metric): _interval(results.interval(name, str(metric))) for metric in summary.index},
         "paired_differences": {
             reference: {metric: _interval(values) for metric, values in differences[name].items()}

@@ -61,7 +61,9 @@ def _css(loader: jinja2.PackageLoader, environment: jinja2.Environment) -> str:
 def _overview(results: Results, policies: list[str]) -> dict[str, Any]:
     """A line of the first table: mean cost of each policy on one environment."""
     costs = {name: numbers(results.interval(name, "return"), -1)[0] for name in results.flown.episodes}
-    return {"label": results.flown.label, "best": results.best, "costs": [(name, costs.get(name)) for name in policies]}
+    bound = "–" if results.bounds is None else number(float(results.bounds.mean()))
+    line = {"label": results.flown.label, "best": results.best, "bound": bound}
+    return line | {"costs": [(name, costs.get(name)) for name in policies]}
 
 
 def _section(index: int, results: Results, looks: Looks, data: dict[str, Any]) -> dict[str, Any]:
@@ -83,6 +85,7 @@ def _section(index: int, results: Results, looks: Looks, data: dict[str, Any]) -
         "columns": _columns(),
         "rows": [_row(results, name) for name in results.ranking],
         "versus": results.best,
+        "bound": None if results.bounds is None else number(float(results.bounds.mean())),
         "figures": {key: _div(figure, f"{key}-{index}") for key, figure in figures.items()},
         "zero_thrust": any((table["delta_v_m_s"] <= 0).any() for table in flown.episodes.values()),
         "hidden": results.hidden,
@@ -121,7 +124,14 @@ def _row(results: Results, name: str) -> dict[str, Any]:
         mean, low, high = numbers(results.interval(name, metric), factor)
         best = metric not in _NEVER_BEST and name in results.best_of(metric)
         cells.append({"mean": mean, "low": low, "high": high, "best": best})
-    return {"policy": name, "best": name == results.best, "cells": cells, "versus": _versus(results, name)}
+    ratio = numbers(results.regrets[name]) if results.regrets else None
+    return {
+        "policy": name,
+        "best": name == results.best,
+        "cells": cells,
+        "versus": _versus(results, name),
+        "regret": ratio and dict(zip(("mean", "low", "high"), ratio, strict=True)),
+    }
 
 
 def _versus(results: Results, name: str) -> dict[str, Any] | None:

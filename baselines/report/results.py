@@ -1,13 +1,16 @@
 """What the flights say: means with intervals, paired differences, and a reading in words."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 from tqdm import tqdm
 
+from baselines.fuel import regret
 from baselines.report.flights import Flown
+from formation_env.dynamics.base import Array
 from formation_env.evaluation import paired_difference, summarise
 from formation_env.metrics import METRICS
 
@@ -31,12 +34,16 @@ class Results:
         ranking: policies, best mean return first.
         summaries: policy -> table of `formation_env.evaluation.summarise`.
         differences: compared-with policy -> policy -> metric -> mean difference and interval, on the same seeds.
+        bounds: least cost that was possible on each seed (seeds,), m/s; None where it is not known.
+        regrets: policy -> mean cost over bound and its interval; empty without bounds.
     """
 
     flown: Flown
     ranking: list[str]
     summaries: dict[str, pd.DataFrame]
     differences: dict[str, dict[str, dict[str, Interval]]]
+    bounds: Array | None
+    regrets: dict[str, Interval]
 
     @property
     def best(self) -> str:
@@ -70,13 +77,18 @@ class Results:
         return int((self.flown.episodes[policy]["steps"] < self.flown.scenario.num_steps).sum())
 
 
-def analyse(flown: list[Flown]) -> list[Results]:
-    """Statistics of all environments, with a progress bar (the bootstrap takes a while for many episodes)."""
+def analyse(flown: list[Flown], bounds: Mapping[str, Array]) -> list[Results]:
+    """Statistics of all environments, with a progress bar (the bootstrap takes a while for many episodes).
+
+    Args:
+        flown: the flights.
+        bounds: least costs (seeds,) by environment, where they are known.
+    """
     with tqdm(total=sum(len(item.episodes) for item in flown), desc="statistics", unit="policy", leave=False) as bar:
-        return [_analyse_one(item, bar) for item in flown]
+        return [_analyse_one(item, bounds.get(item.label), bar) for item in flown]
 
 
-def _analyse_one(flown: Flown, bar: "tqdm[None]") -> Results:
+def _analyse_one(flown: Flown, bounds: Array | None, bar: "tqdm[None]") -> Results:
     summaries = {}
     for name, table in flown.episodes.items():
         summaries[name] = summarise(table)
@@ -84,7 +96,14 @@ def _analyse_one(flown: Flown, bar: "tqdm[None]") -> Results:
     ranking = sorted(summaries, key=lambda name: -summaries[name].loc["return", "mean"])
     references = dict.fromkeys([ranking[0], *([REFERENCE] if REFERENCE in summaries else [])])
     differences = {reference: _differences(flown.episodes, reference) for reference in references}
-    return Results(flown, ranking, summaries, differences)
+    regrets = {} if bounds is None else {name: _regret(table, bounds) for name, table in flown.episodes.items()}
+    return Results(flown, ranking, summaries, differences, bounds, regrets)
+
+
+def _regret(episodes: pd.DataFrame, bounds: Array) -> Interval:
+    """Mean cost over bound, seed by seed, with its interval."""
+    found = regret(-episodes["return"].to_numpy(float), bounds)
+    return found.mean, found.low, found.high
 
 
 def _differences(episodes: dict[str, pd.DataFrame], reference: str) -> dict[str, dict[str, Interval]]:
@@ -112,10 +131,22 @@ def reading(results: Results) -> list[str]:
     ]
     if len(results.ranking) > 1:
         lines.append(_comparison(results, results.ranking[1], episodes))
+    if results.regrets:
+        lines.append(_against_bound(results))
     lost = [f"{name} in {count}" for name in results.ranking if (count := results.ended_early(name))]
     if lost:
         lines.append(f"Episodes that a limit ended early, of {episodes}: {', '.join(lost)}.")
     return lines
+
+
+def _against_bound(results: Results) -> str:
+    """The best policy against what was possible."""
+    assert results.bounds is not None
+    ratio, low, high = numbers(results.regrets[results.best])
+    return (
+        f"Had everything been known beforehand, {number(float(results.bounds.mean()))} m/s would have been enough: "
+        f"{results.best} costs {ratio} times the bound of each seed (95 % interval {low} to {high})."
+    )
 
 
 def _comparison(results: Results, second: str, episodes: int) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from baselines.report.bounds import find_bounds
 from baselines.report.document import document, to_json
 from baselines.report.flights import Environment, PolicyFactory, fly
 from baselines.report.page import render
@@ -22,7 +23,7 @@ def write_report(
         policies: label -> factory that makes the policy for a scenario (or gives None if it has none for it).
         envs: registered ids, names or paths of scenarios, or Scenarios.
         episodes: seeds per environment.
-        out: folder of `FILES`; made if it does not exist.
+        out: folder of `FILES` and of the bounds that were found; made if it does not exist.
         command: the command line that redoes the report; noted in it.
 
     Returns:
@@ -34,7 +35,8 @@ def write_report(
         OSError: the folder cannot be written; nothing in it has changed then.
     """
     seeds = seeds_of("test", episodes)
-    results = analyse(fly(policies, envs, seeds))
+    flown = fly(policies, envs, seeds)
+    results = analyse(flown, find_bounds(flown, seeds, out))
     data = document(results, seeds, command)
     contents = (
         episode_table(results).to_csv(index=False),

@@ -28,7 +28,7 @@ def tune(
     """Search the gains of policies and write them to configs/baselines/SCENARIO.yaml."""
     names = scenarios or [name for name in scenario_names() if not name.startswith("thesis")]
     try:
-        tasks = {(name, each): task(each, name, episodes) for name in names for each in policy or KNOBS}
+        tasks = {(name, each): task(each, name, episodes) for each in policy or KNOBS for name in names}
         for (name, each), wanted in tasks.items():
             _tune_one(
                 wanted, name, trials, out or config_folder("baselines"), studies / f"{Path(name).stem}_{each}.journal"

@@ -45,8 +45,23 @@ def _regulator(section: str, transfer: bool) -> tuple[Knob, ...]:
     )
 
 
+_CORRECTION: Final = (
+    Knob(("correction.miss_m",), 0.3, 300, transfer=True),
+    Knob(("correction.miss_sigmas",), 0.2, 10, transfer=True),
+)
+_KEEPING: Final = (
+    Knob(("keeping.band_m",), 0.5, 200),
+    Knob(("keeping.look_ahead_periods",), 0.05, 2),
+    Knob(("keeping.least_reduction",), 0, 0.95, log=False),
+)
+
 KNOBS: Final[dict[str, tuple[Knob, ...]]] = {
-    "lqr": (Knob(("expected_cost.floor",), 1e-5, 1e-2), Knob(("expected_cost.price_scale",), 0.3, 3.0)),
+    "lqr": (
+        Knob(("expected_cost.floor",), 1e-5, 1e-2),
+        Knob(("expected_cost.price_scale",), 0.3, 3),
+        Knob(("deadband",), 0, 1, log=False),
+    ),
+    "lqr_finite": (*_regulator("transfer", transfer=True), *_regulator("hold", transfer=False)),
     "lqr_tracking": (*_regulator("transfer", transfer=True), *_regulator("hold", transfer=False)),
     "smc": (
         *(Knob((f"surface.decay_per_s.{axis}",), 3e-5, 3e-2) for axis in range(3)),
@@ -54,8 +69,15 @@ KNOBS: Final[dict[str, tuple[Knob, ...]]] = {
         Knob(("reaching.q_per_s",), 3e-5, 3e-2),
         Knob(("boundary_m",), 0.1, 1e4),
     ),
+    "two_impulse": (*_CORRECTION, Knob(("braking",), 0, 1.5, log=False, transfer=True), *_KEEPING),
+    "deadband": (Knob(("least_thrust",), 1e-3, 0.5, transfer=True), *_CORRECTION, *_KEEPING),
+    "mpc": (
+        Knob(("price_scale",), 0.3, 3),
+        Knob(("error_scatter",), 0, 3, log=False),
+        Knob(("thrust_scatter",), 0, 2, log=False),
+    ),
 }
-"""Policy -> its knobs."""
+"""Policy -> its knobs; the slowest comes last."""
 
 
 def knobs_for(policy: str, scenario: Scenario) -> tuple[Knob, ...]:
