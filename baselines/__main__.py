@@ -4,7 +4,7 @@ import typer
 
 from baselines.commands import report, reproduce, sweep
 from baselines.picture import render
-from baselines.tuning import tune
+from baselines.tuning.command import tune
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False)
 app.command()(tune)
