@@ -132,6 +132,7 @@ class Scenario:
         ):
             if name is not None and name not in known:
                 raise ValueError(f"{key}: no dynamics model named {name!r}; {nearest(name, known)}")
+        self._check_truth()
         least, greatest = self.spacecraft.min_accel_m_s2, math.sqrt(3) * self.spacecraft.max_accel_m_s2
         if least > greatest:
             raise ValueError(
@@ -146,6 +147,18 @@ class Scenario:
         self._check_start()
         self.dropout.chain(self.dt_s, self.orbit)
         return self
+
+    def _check_truth(self) -> None:
+        """Refuse a truth that would leave out what other settings ask for."""
+        if self.dynamics == NONLINEAR:
+            return
+        if self.perturbations != Perturbations():
+            raise ValueError(f"perturbations: act in the truth nonlinear only, but dynamics is {self.dynamics!r}")
+        if self.orbit.eccentricity > 0 and get_dynamics(self.dynamics).time_invariant:
+            raise ValueError(
+                f"dynamics: {self.dynamics} is for circular orbits, got orbit.eccentricity = "
+                f"{self.orbit.eccentricity:g}; use yamanaka_ankersen or nonlinear"
+            )
 
     def _check_clock(self) -> None:
         """Refuse too many steps, and phases shorter than a step."""

@@ -205,6 +205,25 @@ def test_batch_is_bit_for_bit_the_single_environment(name: str) -> None:
             np.testing.assert_array_equal(alone["true_state"], info["true_state"][row])
 
 
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        (
+            {"perturbations": Perturbations(sun=True)},
+            "perturbations: act in the truth nonlinear only, but dynamics is 'hcw'",
+        ),
+        (
+            {"orbit": Orbit(altitude_m=2e6, eccentricity=0.1)},
+            "dynamics: hcw is for circular orbits, got orbit.eccentricity",
+        ),
+    ],
+)
+def test_linear_truths_refuse_what_they_would_leave_out(changes: dict[str, object], message: str) -> None:
+    """A setting that would do nothing, or something else than it says, is an error that names it."""
+    with pytest.raises(ValueError, match=message):
+        dataclasses.replace(load_scenario("keeping"), dynamics="hcw", **changes)
+
+
 def test_filter_keeps_a_linear_model() -> None:
     """The belief is modified HCW about a circle and Yamanaka & Ankersen's about an ellipse, unless it is named."""
     assert load_scenario("keeping_nonlinear").belief.dynamics == "modified_hcw"

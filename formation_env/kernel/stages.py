@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_env.dynamics.base import Array
-from formation_env.jit import LANES, stage
+from formation_env.jit import LANES, lane, stage
 from formation_env.kernel import filter, lanes, packing
 from formation_env.kernel import tile as f
 from formation_env.kernel.linear import read_model, read_process
@@ -162,6 +162,12 @@ def begin(t: Array, lane_set: LaneSet, given: bool, c: packing.Scalars) -> None:
         lanes.begin(t, i, given, c)
 
 
+@lane
+def _column(k: int) -> int:
+    """Where a column of the schedule stands in the tile."""
+    return f.PLAN + k * LANES if k < WIDTH else f.TABLE + (k - WIDTH) * LANES
+
+
 @stage
 def read_plan(t: Array, lane_set: LaneSet, used: int, schedule: Array, known_step: int) -> int:
     """The schedule's rows. Mostly all rows are at one step, which the scratch space may hold already.
@@ -183,13 +189,14 @@ def read_plan(t: Array, lane_set: LaneSet, used: int, schedule: Array, known_ste
         same &= t[f.STEP + i] == t[f.STEP]
     if same and first == known_step:
         return first
-    for k in range(schedule.shape[1]):
-        field = f.PLAN + k * LANES if k < WIDTH else f.TABLE + (k - WIDTH) * LANES
-        if same:
+    if same:
+        for k in range(schedule.shape[1]):
             value = schedule[first, k]
             for i in range(len(lane_set)):
-                t[field + i] = value
-        else:
-            for i in range(len(lane_set)):
-                t[field + i] = schedule[min(int(t[f.STEP + i]), last), k]
-    return first if same else -1
+                t[_column(k) + i] = value
+        return first
+    for i in range(len(lane_set)):
+        step = min(int(t[f.STEP + i]), last)
+        for k in range(schedule.shape[1]):
+            t[_column(k) + i] = schedule[step, k]
+    return -1
