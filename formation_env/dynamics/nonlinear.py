@@ -14,14 +14,12 @@ from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
-from scipy.integrate import solve_ivp
 
 from formation_env import forces
 from formation_env.atmosphere import exponential_density_kg_m3
 from formation_env.constants import MU_MOON, MU_SUN, R_EARTH
 from formation_env.dynamics.base import Array
 from formation_env.elements import to_cartesian
-from formation_env.ephemeris import moon_position_m, sun_position_m
 from formation_env.frames import eci_to_lvlh, lvlh_axes, lvlh_frame, lvlh_to_eci
 from formation_env.orbit import Orbit
 from formation_env.perturbations import Perturbations
@@ -61,6 +59,8 @@ class World:
 
     def sun_and_moon(self, times_s: Any) -> tuple[Array, Array]:
         """Their positions (..., 3) at times (...), m."""
+        from formation_env.ephemeris import moon_position_m, sun_position_m  # ERFA is slow to import
+
         epoch = self.perturbations.epoch_jd
         return sun_position_m(epoch, times_s), moon_position_m(epoch, times_s)
 
@@ -99,6 +99,7 @@ def coast(world: World, craft: Spacecraft, states: Array, times_s: Array) -> Arr
     Returns:
         States (T, N, 6).
     """
+    from scipy.integrate import solve_ivp  # slow to import, and linear truths do without it
 
     def rates(time_s: float, y: Array) -> Array:
         position, velocity = np.split(y.reshape(-1, 6), 2, axis=1)
