@@ -18,7 +18,7 @@ import numpy as np
 from baselines.expected_cost import expected_cost_gains
 from baselines.policy import Observations
 from baselines.riccati import closed_loop, least_fuel_gains
-from baselines.timeline import Instants, by_steps_left, nominal_start, start_error, transfer_reference
+from baselines.timeline import Instants, by_steps_left, nominal_start, read_instants, start_error, transfer_reference
 from baselines.transfers import two_impulse
 from formation_env.dynamics.base import Array, DiscreteModel
 from formation_env.scenario import Scenario
@@ -55,9 +55,8 @@ class Guidance:
     """
 
     def __init__(self, scenario: Scenario, guide: Guide) -> None:
-        layout = observation_layout(scenario)
+        self._layout, self._dt_s = observation_layout(scenario), scenario.dt_s
         paths = {leg: desired_states(scenario, leg, guide) for leg in legs(scenario)}
-        self._layout, self._steps_per_unit = layout, layout.period_s / scenario.dt_s
         self.desired = by_steps_left(scenario, lambda leg: paths[leg])
         self.residuals = by_steps_left(scenario, lambda leg: _residual(scenario, leg, paths[leg]))
         self._offsets = self.desired - by_steps_left(scenario, lambda leg: _reference(scenario, leg))
@@ -68,8 +67,8 @@ class Guidance:
         Args:
             observation: (..., SIZE).
         """
-        steps = np.rint(self._layout.scalar(observation, "time_left") * self._steps_per_unit).astype(np.intp)
-        at = self._layout.phase(observation), np.clip(steps, 0, self._offsets.shape[1] - 1)
+        phase, steps_left = read_instants(observation, self._layout, self._dt_s)
+        at = phase, np.clip(steps_left, 0, self._offsets.shape[1] - 1)
         return Tracking(self._layout.state(observation, "error") - self._offsets[at], at)
 
 

@@ -12,6 +12,7 @@ from baselines.blocks import block_ends, horizon_end, shared_prices
 from baselines.cone_program import ConeProgram, Horizon, Plan
 from baselines.expected_cost import episode_scatter
 from baselines.policy import AccelerationPolicy, Observations
+from baselines.timeline import read_instants
 from formation_env.dynamics.base import Array, DiscreteModel
 from formation_env.scenario import Scenario
 from formation_env.schedule import OFFSETS, build_schedule, legs, observation_layout
@@ -102,9 +103,8 @@ class MPC(AccelerationPolicy):
 
     def _instants(self, rows: Observations) -> NDArray[np.intp]:
         """The instants of rows of observations, in steps."""
-        left = self._layout.scalar(rows, "time_left") * self._layout.period_s / self.scenario.dt_s
-        ends = np.array([leg.end for leg in self._legs])
-        return np.asarray(ends[self._layout.phase(rows)] - np.rint(left).astype(np.intp))
+        phase, steps_left = read_instants(rows, self._layout, self.scenario.dt_s)
+        return np.asarray(np.array([leg.end for leg in self._legs])[phase] - steps_left)
 
     def _scatter(self) -> tuple[Array, Array]:
         """Scatter of the position (num_steps + 1,), m, and of the thrust (num_steps,), m/s^2, with their factors."""

@@ -6,11 +6,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_env.dynamics.base import Array
+from formation_env.observation import ObservationLayout
 from formation_env.scenario import Scenario
 from formation_env.schedule import Leg, leg_reference, legs
 
 Instants = tuple[NDArray[np.intp], NDArray[np.intp]]
 """Phases (...) and steps left to their ends (...), which index the tables of `by_steps_left`."""
+
+
+def read_instants(observation: NDArray[np.floating], layout: ObservationLayout, dt_s: float) -> Instants:
+    """Where observations (..., SIZE) stand on the clock.
+
+    Args:
+        observation: (..., SIZE).
+        layout: of the observations.
+        dt_s: time step, s.
+    """
+    steps_left = np.rint(layout.scalar(observation, "time_left") * (layout.period_s / dt_s))
+    return layout.phase(observation), steps_left.astype(np.intp)
 
 
 def by_steps_left(scenario: Scenario, values: Callable[[Leg], Array]) -> Array:

@@ -13,12 +13,8 @@ from formation_env.dynamics import NONLINEAR
 from formation_env.scenario import Scenario
 from formation_env.seeds import seeds
 
-A_175_S2: Final = 4150.0
-"""Factor of the control weight with which the error-state law keeps within the 175 m of Figure 5.9, s^2."""
 A_70_S2: Final = 1650.0
-"""The same for a mean error of 70 m, the accuracy at which section 5.2.3 compares, s^2."""
-A_MANEUVER_S2: Final = 1500.0
-"""The same for the 0.06 m/s^2 of Figure 5.20; the thesis prints no weight for its maneuvers, s^2."""
+"""Factor of the control weight that gives a mean error of 70 m, at which section 5.2.3 compares, s^2."""
 
 
 KEPT_S: Final = 60.0
@@ -135,7 +131,7 @@ def error_state(control_s2: float | None = None) -> Law:
 
 KEEPERS: Final[dict[str, Law]] = {
     "lqr": plan.LQR,
-    "lqr_175": error_state(A_175_S2),
+    "lqr_175": error_state(plan.FINER_S2),
     "lqr_70": error_state(A_70_S2),
     "lqr_feedforward": WithPath(plan.LQR.name, plan.LQR.shipped),
     "smc": plan.SMC,

@@ -7,13 +7,13 @@ import numpy as np
 
 from baselines.thesis import plan, scenarios
 from baselines.thesis.claim import Claim
-from baselines.thesis.claims_flights import A_MANEUVER_S2, Deck, Effort, as_printed, deal, error_state
+from baselines.thesis.claims_flights import Deck, Effort, as_printed, deal, error_state
 from baselines.thesis.claims_verdict import Between, Statement
 from baselines.thesis.flights import Flights
 from baselines.thesis.jobs import Job
 from formation_env.dynamics.base import Array
 
-LAWS = {"quick": error_state(A_MANEUVER_S2)}
+LAWS = {"quick": error_state(plan.MANEUVER_S2)}
 """With the weight that the figures' thrust asks for."""
 
 VELOCITY_M_S = (0.0, 1.0, 0.0)
@@ -79,7 +79,7 @@ def claims(flown: Maneuvers, effort: Effort) -> list[Claim]:
 def assumption_of(effort: Effort, dt_s: float) -> str:
     """What the verdicts on maneuvers rest on."""
     return (
-        f"T = {dt_s:g} s, {effort.maneuver_assumption}; error-state law; a = {A_MANEUVER_S2:g}, since the thesis "
+        f"T = {dt_s:g} s, {effort.maneuver_assumption}; error-state law; a = {plan.MANEUVER_S2:g}, since the thesis "
         "prints no weight for its maneuvers"
     )
 

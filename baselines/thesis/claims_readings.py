@@ -13,7 +13,7 @@ import pandas as pd
 from baselines.policy import AccelerationPolicy
 from baselines.registry import make_policy
 from baselines.thesis import plan, scenarios
-from baselines.thesis.claims_flights import A_175_S2, KEPT_S, Effort, Noise, WithPath, error_state
+from baselines.thesis.claims_flights import KEPT_S, Effort, Noise, WithPath, error_state
 from baselines.thesis.flights import Flights
 from baselines.thesis.jobs import Job, Law
 from formation_env.scenario import Scenario
@@ -83,7 +83,7 @@ class Reading:
 
 READINGS: Final = (
     Reading("error-state law, k as printed", LQR, plan.DYNAMICS),
-    Reading("error-state law, k as printed, a = 4150", error_state(A_175_S2), plan.DYNAMICS),
+    Reading("error-state law, k as printed, a = 4150", error_state(plan.FINER_S2), plan.DYNAMICS),
     Reading("error-state law, k as printed, 60 s", LQR, plan.DYNAMICS, dt_s=60.0),
     Reading("error-state law, k as printed, start as printed", LQR, plan.DYNAMICS, start=ROUNDED),
     Reading("error-state law, k as printed, much noise", LQR, plan.DYNAMICS, NOISY),
