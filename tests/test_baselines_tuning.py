@@ -165,6 +165,25 @@ def test_command_writes_gains_that_load_and_are_no_worse(tmp_path: Path) -> None
     assert journal.name == "keeping_smc.journal"
 
 
+def test_slow_policies_have_a_budget_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One command searches all of them, each with its number of trials and of seeds, and the file says which."""
+    flown = list[tuple[str, int, int]]()
+
+    def costs(self: Task, batch: list[dict[str, float]]) -> Array:
+        flown.append((self.policy, len(self.episode_seeds), len(batch)))
+        return np.arange(len(batch), dtype=float)
+
+    monkeypatch.setattr(Task, "costs", costs)
+    budget = ("--trials", 6, "--episodes", 5, "--slow-trials", 3, "--slow-episodes", 2)
+    folders = ("--out", tmp_path, "--studies", tmp_path / "studies")
+    result = tune("keeping", "--policy", "smc", "--policy", "mpc", *budget, *folders)
+    assert result.exit_code == 0, result.output
+    assert flown == [("smc", 5, 6), ("mpc", 2, 3)]
+    text = (tmp_path / "keeping.yaml").read_text()
+    assert "tune keeping --policy mpc --slow-trials 3 --slow-episodes 2\n" in text
+    assert "tune keeping --policy smc --trials 6 --episodes 5\n" in text
+
+
 def test_interrupt_ends_in_one_line_and_keeps_the_trials(
     lqr: Task, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
