@@ -7,7 +7,7 @@ import typer
 
 from baselines.registry import SLOW
 from baselines.tuning.gain_file import write_section
-from baselines.tuning.knobs import KNOBS, first_gains, knobs_for
+from baselines.tuning.knobs import KNOBS, first_gains, knobs_for, present_gains
 from baselines.tuning.study import Task, search
 from formation_env.scenario import config_folder, load_scenario, scenario_names
 from formation_env.seeds import seeds
@@ -64,15 +64,17 @@ def task(policy: str, name: str, episodes: int) -> Task:
 
 def _tune_one(wanted: Task, name: str, trials: int, folder: Path, journal: Path) -> None:
     """Search, write, and tell."""
+    path = folder / f"{Path(name).stem}.yaml"
+    present = present_gains(wanted.policy, path, wanted.knobs)
     with typer.progressbar(length=trials, label=f"{name} {wanted.policy}") as bar:
-        found = search(wanted, trials, journal, bar.update)
+        found = search(wanted, trials, journal, bar.update, present)
     count, flown = len(wanted.episode_seeds), wanted.episode_seeds
     summary = f"mean cost {found.cost:.4f} m/s (trial {found.trial}; first gains {found.first_cost:.4f} m/s)"
     slow = "slow-" if wanted.policy in SLOW else ""
     budget = f"--{slow}trials {trials} --{slow}episodes {count}"
     command = f"python -m baselines tune {name} --policy {wanted.policy} {budget}"
     comment = f"{command}\nseeds {flown[0]} to {flown[-1]}, {summary}"
-    write_section(folder / f"{Path(name).stem}.yaml", wanted.policy, found.gains, comment)
+    write_section(path, wanted.policy, found.gains, comment)
     typer.echo(f"{name} {wanted.policy}: {summary}")
 
 
