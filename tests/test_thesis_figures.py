@@ -15,9 +15,10 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from baselines import jobs
 from baselines.__main__ import app
 from baselines.registry import make_policy
-from baselines.thesis import claims, jobs, plan, report, scenarios, tables
+from baselines.thesis import claims, plan, report, scenarios, tables
 from baselines.thesis.claim import Claim
 from baselines.thesis.figures import FIGURES, drawings, orbits, style
 from baselines.thesis.flights import Flights, desired_path, fly

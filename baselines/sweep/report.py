@@ -8,15 +8,14 @@ from pathlib import Path
 from typing import Any, Final
 
 import pandas as pd
-from tqdm import tqdm
 
+from baselines import jobs
 from baselines.registry import POLICIES
 from baselines.report.document import to_json, versions
 from baselines.report.flights import Environment, name_environments
 from baselines.sweep.flights import points, summarise
 from baselines.sweep.report_page import render
 from baselines.sweep.variations import VARIATIONS
-from baselines.thesis import jobs
 from formation_env.files import write_texts
 from formation_env.scenario import Scenario
 from formation_env.seeds import seeds as seeds_of
@@ -67,11 +66,7 @@ def write_sweep(envs: Sequence[Environment], wanted: Wanted, out: Path, command:
     work = points(scenarios, policies, seeds, wanted.bound_episodes)
     if any(job.bound_seeds for job in work.values()):
         import_module("clarabel")  # that it is missing should be known before the flights, not after
-    first = "flying (the very first run compiles the kernel)"
-    with tqdm(
-        total=sum(job.cost for job in work.values()), desc=first, unit="step", unit_scale=True, dynamic_ncols=True
-    ) as bar:
-        found = jobs.run(work, bar.update, workers)
+    found = jobs.fly(work, workers)
     episodes = pd.concat([found[name] for name in work], ignore_index=True)
     summary = summarise(episodes)
     data = document(scenarios, summary, seeds, wanted, command)
