@@ -2,15 +2,19 @@
 
 import multiprocessing
 import signal
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from multiprocessing.sharedctypes import Synchronized
-from typing import Any, Final, Protocol
+from typing import Any, Final, Protocol, TypeVar
 
 from tqdm import tqdm
 
 POLL_S: Final = 0.2
 """How often the progress of other processes is asked for."""
+
+Name = TypeVar("Name", bound=Hashable)
+Progress = Callable[[int], Any]
+"""Told the cost of what was flown since the last call."""
 
 
 class Work(Protocol):
@@ -21,12 +25,39 @@ class Work(Protocol):
         """How long it takes, in steps of one law."""
         ...
 
-    def fly(self, progress: Callable[[int], Any]) -> Any:
+    def fly(self, progress: Progress) -> Any:
         """Fly it; progress is called with the cost of what was flown since the last call."""
         ...
 
 
-def run(jobs: Mapping[str, Work], progress: Callable[[int], Any], workers: int) -> dict[str, Any]:
+class Share:
+    """A job's progress in its own cost, whatever it counts itself.
+
+    Args:
+        progress: told the cost of what was flown since the last call.
+        cost: of the whole job.
+        total: what the job counts up to.
+    """
+
+    def __init__(self, progress: Progress, cost: int, total: int) -> None:
+        self._progress, self._cost, self._total = progress, cost, total
+        self._done = self._told = 0
+
+    def advance(self, count: int) -> None:
+        """So many more are done."""
+        self._done += count
+        self._tell(self._cost * self._done // self._total)
+
+    def finish(self) -> None:
+        """All is done, even where less was to do."""
+        self._tell(self._cost)
+
+    def _tell(self, cost: int) -> None:
+        self._progress(cost - self._told)
+        self._told = cost
+
+
+def run(jobs: Mapping[Name, Work], progress: Progress, workers: int) -> dict[Name, Any]:
     """Fly all jobs, the longest ones first, and give what each found.
 
     Args:
@@ -56,7 +87,7 @@ def run(jobs: Mapping[str, Work], progress: Callable[[int], Any], workers: int) 
         return {name: future.result() for name, future in futures.items()}
 
 
-def fly(jobs: Mapping[str, Work], workers: int) -> dict[str, Any]:
+def fly(jobs: Mapping[Name, Work], workers: int) -> dict[Name, Any]:
     """Fly all jobs with a progress bar, and give what each found.
 
     Args:

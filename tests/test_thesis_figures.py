@@ -349,6 +349,6 @@ def test_ctrl_c_ends_all_processes_in_one_line(tmp_path: Path) -> None:
         process.send_signal(signal.SIGTERM)
         rest = process.stderr.read()
     assert process.returncode == 130
-    assert rest.endswith("reproduce: interrupted, nothing written\n")
+    assert rest.endswith("reproduce: interrupted, no report written\n")
     assert "Traceback" not in rest
     assert not out.exists()
