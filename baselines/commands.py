@@ -29,9 +29,10 @@ def report(
     env: Envs = None,
     policy: Policies = None,
     episodes: Episodes = 100,
-    slow_episodes: Annotated[int, typer.Option(min=1, help="Of these the first ones, for mpc, which is slow.")] = 8,
+    slow_episodes: Annotated[int, typer.Option(min=1, help="Of these the first ones, for mpc, which is slow.")] = 5,
     sweep_episodes: Annotated[int, typer.Option(min=0, help="For fronts and robustness; 0 leaves them out.")] = 10,
     bound_episodes: Annotated[int, typer.Option(min=0, help="Of these, for the fronts' bound; 0 is none.")] = 2,
+    fine: Annotated[bool, typer.Option("--fine", help="Fronts and robustness at more values.")] = False,
     resume: Resume = False,
     out: Out = Path("reports"),
     processes: Processes = PROCESSES,
@@ -44,7 +45,7 @@ def report(
     def write() -> Path:
         from baselines.report import Wanted, write_report
 
-        wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, resume)
+        wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, not fine, resume)
         return write_report(_classical(names), env or list(ENV_IDS), wanted, out, command, processes)
 
     _run("report", out, write)

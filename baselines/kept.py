@@ -88,12 +88,11 @@ def write(path: Path, table: pd.DataFrame) -> None:
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     columns = {str(name): values.to_numpy() for name, values in table.items()}
-    # pandas keeps texts as objects, which numpy would pickle
-    plain = {
-        name: values.astype(str) if values.dtype.kind not in "biuf" else values for name, values in columns.items()
-    }
+    for name, values in columns.items():
+        if values.dtype.kind not in "biuf":
+            columns[name] = values.astype(str)  # pandas keeps texts as objects, which numpy would pickle
     with replacing(path) as temporary:
-        np.savez_compressed(temporary, **plain)
+        np.savez_compressed(temporary, **columns)
 
 
 def read(path: Path) -> pd.DataFrame | None:
