@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from agents.runs import LearnedPolicy, load_policy, load_run
-from baselines import make_policy
+from baselines.factories import Classical, PolicyFactory
 from baselines.registry import POLICIES
-from baselines.report import PolicyFactory, write_report
+from baselines.report import Wanted, write_report
 from formation_env.evaluation import scenario_of
 from formation_env.scenario import Scenario
 from formation_env.settings import ConfigError
@@ -32,11 +32,11 @@ def report_models(models: Sequence[str], envs: Sequence[str] | None, episodes: i
     folders = parse_models(models)
     if not envs:
         envs = list(dict.fromkeys(load_run(folder).env for runs in folders.values() for folder in runs))
-    policies: dict[str, PolicyFactory] = {name: _classical(name) for name in POLICIES}
+    policies: dict[str, PolicyFactory] = {name: Classical(name) for name in POLICIES}
     for label, runs in folders.items():
         policies[label] = learned(label, [load_policy(folder) for folder in runs])
     _check_trained(folders, envs)
-    return write_report(policies, envs, episodes, out, command)
+    return write_report(policies, envs, Wanted(episodes, sweep_episodes=0), out, command)
 
 
 def parse_models(models: Sequence[str]) -> dict[str, list[Path]]:
@@ -66,14 +66,10 @@ def learned(label: str, policies: Sequence[LearnedPolicy]) -> PolicyFactory:
         if any(policy.scenario == other.scenario for other in policies[:index]):
             raise ConfigError(f"--model: {label}: two runs were trained on the same scenario")
 
-    def factory(scenario: Scenario) -> LearnedPolicy | None:
-        return next((policy for policy in policies if policy.scenario == scenario), None)
+    def factory(original: Scenario, believed: Scenario) -> LearnedPolicy | None:
+        return next((policy for policy in policies if policy.scenario == original), None)
 
     return factory
-
-
-def _classical(name: str) -> PolicyFactory:
-    return lambda scenario: make_policy(name, scenario)
 
 
 def _check_trained(folders: dict[str, list[Path]], envs: Sequence[str]) -> None:

@@ -251,8 +251,9 @@ def test_the_report_flies_a_model_on_its_own_scenario_only(finished: tuple[Run, 
     run, folder = finished
     policy = load_policy(folder)
     factory = learned("mine", [policy])
-    assert factory(Scenario(**vars(run.scenario))) is policy
-    assert factory(Scenario(**{**vars(run.scenario), "process_noise_m_s2": 0.0})) is None
+    same, other = Scenario(**vars(run.scenario)), Scenario(**{**vars(run.scenario), "process_noise_m_s2": 0.0})
+    assert factory(same, other) is policy
+    assert factory(other, same) is None
     with pytest.raises(ConfigError, match="mine: two runs were trained on the same scenario"):
         learned("mine", [policy, load_policy(folder)])
 
