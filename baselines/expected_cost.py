@@ -20,6 +20,7 @@ from baselines.riccati import OVERLOAD, time_varying_regulator
 from baselines.timeline import start_error
 from formation_env.dynamics.base import Array, DiscreteModel
 from formation_env.estimation import process_noise_covariance
+from formation_env.jit import loop
 from formation_env.scenario import Scenario
 from formation_env.schedule import Leg, legs
 
@@ -89,21 +90,26 @@ def spread(model: DiscreteModel, gains: Array, start: Array, first: Array, known
         first: covariance (6, 6) of the estimate about it.
         known: of the instants of the phase.
     """
-    second = np.outer(start, start) + first
-    control, error, peak = np.zeros(len(gains)), np.zeros(len(gains) + 1), np.zeros(len(gains))
-    for step, K in enumerate(gains):
-        squares = ((K @ second) * K).sum(axis=1)  # the diagonal of K X K'
-        control[step], peak[step] = np.sqrt(squares.sum()), np.sqrt(squares.max())
-        error[step] = _rms_position(second, known.missed[step])
-        loop = model.Phi[step] - model.Gamma[step] @ K
-        second = loop @ second @ loop.T + known.learned[step + 1]
-    error[-1] = _rms_position(second, known.missed[-1])
-    return Spread(control, error, peak, second)
+    second, steps = np.zeros((len(gains) + 1, 6, 6)), len(gains)
+    second[0] = np.outer(start, start) + first
+    Phi, Gamma = (np.ascontiguousarray(part) for part in (model.Phi, model.Gamma))
+    _moments(Phi, Gamma, np.ascontiguousarray(gains), known.learned, second)
+    squares = ((gains @ second[:steps]) * gains).sum(axis=2)  # the diagonals of K X K'
+    in_position = np.einsum("tii->ti", second + known.missed)[:, :3]
+    return Spread(
+        control=np.sqrt(squares.sum(axis=1)),
+        error=np.sqrt(in_position.sum(axis=1)),
+        peak=np.sqrt(squares.max(axis=1)),
+        last=second[-1],
+    )
 
 
-def _rms_position(estimated: Array, missed: Array) -> float:
-    """Root mean square of the true position error, m, from the moments of its estimate and of the estimate's error."""
-    return float(np.sqrt((estimated.diagonal() + missed.diagonal())[:3].sum()))
+@loop
+def _moments(Phi: Array, Gamma: Array, gains: Array, learned: Array, second: Array) -> None:
+    """Fill in the estimated error's second moments (steps + 1, 6, 6) from the first on."""
+    for step in range(len(gains)):
+        closed = Phi[step] - Gamma[step] @ gains[step]
+        second[step + 1] = closed @ second[step] @ closed.T + learned[step + 1]
 
 
 @dataclass(frozen=True)

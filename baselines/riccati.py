@@ -11,6 +11,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from formation_env.dynamics.base import Array
+from formation_env.jit import loop
 
 OVERLOAD: Final = 10.0
 """How much more a control costs in `least_fuel_gains`, per limit beyond the limit."""
@@ -125,10 +126,17 @@ def time_varying_regulator(Phi: Array, Gamma: Array, Q: Array, R: Array) -> tupl
         Gains K (steps, 3, 6), from the first step on, and R + Gamma' P Gamma (steps, 3, 3): that times K x is what a
         first bit of control takes off the cost to come, so long as there is none.
     """
-    gains, (Phis, Gammas) = np.zeros((len(R), 3, 6)), per_step(Phi, Gamma, len(R))
-    stiffness = np.zeros((len(R), 3, 3))
+    Phis, Gammas = (np.ascontiguousarray(part) for part in per_step(Phi, Gamma, len(R)))
+    gains, stiffness = np.zeros((len(R), 3, 6)), np.zeros((len(R), 3, 3))
+    _recursion(Phis, Gammas, np.ascontiguousarray(Q, dtype=float), R, gains, stiffness)
+    return gains, stiffness
+
+
+@loop
+def _recursion(Phis: Array, Gammas: Array, Q: Array, R: Array, gains: Array, stiffness: Array) -> None:
+    """Fill in gains (steps, 3, 6) and stiffnesses (steps, 3, 3), from the last step to the first."""
     P = Q[-1]
-    for step in reversed(range(len(R))):
+    for step in range(len(R) - 1, -1, -1):
         F, G = Phis[step], Gammas[step]
         PG = P @ G
         stiffness[step] = R[step] + G.T @ PG
@@ -136,7 +144,6 @@ def time_varying_regulator(Phi: Array, Gamma: Array, Q: Array, R: Array) -> tupl
         gains[step] = np.linalg.solve(stiffness[step], PG.T @ F)
         P = F.T @ P @ (F - G @ gains[step]) + Q[step]
         P = (P + P.T) / 2
-    return gains, stiffness
 
 
 def per_step(Phi: Array, Gamma: Array, steps: int) -> tuple[Array, Array]:

@@ -39,3 +39,8 @@ def shared(function: F) -> F:
     """Leave a function of scalars or arrays to Python as it is, and inline it where compiled code calls it."""
     wrapped: F = register_jitable(**_ARITHMETIC, forceinline=True)(function)
     return wrapped
+
+
+def loop(function: F) -> F:
+    """Compile a loop over arrays that Python calls; kept on disk."""
+    return cast(F, numba.njit(**_ARITHMETIC, cache=True)(function))

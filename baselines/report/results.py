@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
 from tqdm import tqdm
 
@@ -112,11 +113,9 @@ def _analyse_one(flown: Flown, bounds: Array | None, bar: "tqdm[None]") -> Resul
     longest = max(len(table) for table in episodes.values())
     full = [name for name, table in episodes.items() if len(table) == longest]
     reference = max(full, key=lambda name: episodes[name]["return"].mean())
-    summaries = {reference: summarise(episodes[reference])}
+    summaries = {}
     for name, table in episodes.items():
-        if name != reference:
-            whole = name in full
-            summaries[name] = summarise(table) if whole else estimate(table, episodes[reference], summaries[reference])
+        summaries[name] = summarise(table) if name in full else estimate(table, episodes[reference], bounds)
         bar.update()
     ranking = sorted(summaries, key=lambda name: -summaries[name].loc["return", "mean"])
     compared = dict.fromkeys([ranking[0], *([REFERENCE] if REFERENCE in summaries else [])])
@@ -126,18 +125,25 @@ def _analyse_one(flown: Flown, bounds: Array | None, bar: "tqdm[None]") -> Resul
     return Results(flown, ranking, reference, summaries, differences, bounds, regrets)
 
 
-def estimate(few: pd.DataFrame, reference: pd.DataFrame, summary: pd.DataFrame) -> pd.DataFrame:
+def estimate(few: pd.DataFrame, reference: pd.DataFrame, bounds: Array | None) -> pd.DataFrame:
     """What a policy that flew some of the seeds would have as means over all: the reference's and the difference.
 
-    The seeds that were flown may be easy or hard ones; the difference to a policy that flew them, too, is nearly free
-    of that. Half-widths of the two intervals, of the reference over all seeds and of the difference, add as squares.
+    The seeds that were flown may be easy or hard ones; the difference to what they cost another policy, or must cost,
+    is nearly free of that. Half-widths of the two intervals, of the reference over all seeds and of the difference,
+    add as squares.
 
     Args:
         few: episodes of the policy.
         reference: episodes of a policy on all seeds, these among them as the first.
-        summary: its means, see `formation_env.evaluation.summarise`.
+        bounds: least costs of all seeds (seeds,), m/s, if they are known: for the return they take the reference's
+            place if the difference to them scatters less.
     """
-    rows = {}
+    if bounds is not None:
+        costs = -few["return"].to_numpy(float)
+        known = (-reference["return"].to_numpy(float), bounds)
+        nearest = min(known, key=lambda cost: np.std(costs - cost[: len(costs)]))
+        reference = reference.assign(**{"return": -nearest})
+    rows, summary = {}, summarise(reference)
     for metric in METRICS:
         mean, low, high = _difference(few, reference, metric)
         base, base_low, base_high = (float(value) for value in summary.loc[metric])

@@ -96,9 +96,14 @@ def fewer(results: Results) -> str:
         return ""
     counts = ", ".join(f"{name} ({results.count(name)})" for name in results.partial)
     every = results.count(results.reference)
+    cost = (
+        ""
+        if results.bounds is None
+        else "; for the return the bound stands in where the difference to it scatters less"
+    )
     return (
         f"Too slow for all {every} seeds: {counts} flew the first ones only; their means are estimates for all seeds, "
-        f"those of {results.reference}, the best that flew all, plus the mean difference to it on the same seeds."
+        f"those of {results.reference}, the best that flew all, plus the mean difference to it on the same seeds{cost}."
     )
 
 
