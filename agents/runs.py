@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 from zipfile import BadZipFile, is_zipfile
 
-import numpy as np
 from pydantic import Field, Strict
 
 from agents.settings import SETTINGS, AgentSettings, Algorithm
+from agents.throttle import throttle
 from formation_env.files import replacing, write_texts
 from formation_env.scenario import Scenario
 from formation_env.settings import ConfigError, Text, build, settings
@@ -115,14 +115,14 @@ class LearnedPolicy:
         self.scenario = run.scenario
         self.settings = run.agent
         self._policy = model.policy
-        self._scale = np.float32(run.agent.action_scale)
+        self._throttle_power = run.agent.throttle_power
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Any, Any]:
         """Actions (3,) or (rows, 3), in units of max_accel_m_s2, for one observation or a batch; and `state`."""
         actions, _ = self._policy.predict(observation, deterministic=deterministic)
-        return self._scale * actions, state
+        return throttle(actions, self._throttle_power), state
 
 
 def load_policy(folder: str | Path, name: str = MODEL) -> LearnedPolicy:

@@ -2,8 +2,7 @@
 
 Observations are already of order 1 and are learnt from as they are. Rewards are in m/s and small; they are multiplied
 by one constant, `reward_scale`, so that values are of order 1: unlike running statistics, a constant cannot drift, and
-a saved model needs nothing beside it. Actions may be learnt in a share of the greatest thrust, `action_scale`: where a
-mission needs little of it, exploration over all of it costs far more fuel than the mission.
+a saved model needs nothing beside it. Actions are learnt as throttles, see `agents.throttle`.
 """
 
 from collections.abc import Mapping
@@ -62,10 +61,10 @@ class PPOSettings:
         entropy_coef: weight of the entropy in the loss.
         value_coef: weight of the value error in the loss.
         max_grad_norm: gradients are cut to this norm.
-        log_std_init: natural logarithm of the first exploration noise, in units of action_scale. Noise costs fuel, so
-            it starts low.
+        log_std_init: natural logarithm of the first exploration noise, of the throttle. Noise costs fuel, so it
+            starts low.
         reward_scale: rewards are multiplied by this, per m/s.
-        action_scale: the policy's actions are multiplied by this: its 1 is this share of the greatest thrust.
+        throttle_power: p of the thrust sign(z) |z|^p that the network's output z stands for, in units of the greatest.
         network: layers.
     """
 
@@ -83,7 +82,7 @@ class PPOSettings:
     max_grad_norm: Positive = 0.5
     log_std_init: Real = -1.0
     reward_scale: Positive = 3.0
-    action_scale: Share = 0.2
+    throttle_power: Positive = 3.0
     network: Network = Network()
 
     @model_validator(mode="after")
@@ -111,7 +110,7 @@ class SACSettings:
         entropy_init: first temperature.
         target_entropy: entropy of the actions that the temperature aims at, in nats; low, since noise costs fuel.
         reward_scale: rewards are multiplied by this, per m/s.
-        action_scale: the policy's actions are multiplied by this: its 1 is this share of the greatest thrust.
+        throttle_power: p of the thrust sign(z) |z|^p that the network's output z stands for, in units of the greatest.
         network: layers.
     """
 
@@ -126,7 +125,7 @@ class SACSettings:
     entropy_init: Positive = 0.01
     target_entropy: Real = -6.0
     reward_scale: Positive = 10.0
-    action_scale: Share = 0.1
+    throttle_power: Positive = 3.0
     network: Network = Network(activation="relu")
 
 

@@ -9,7 +9,7 @@ from tqdm import tqdm
 from agents.models import make_model
 from agents.runs import TENSORBOARD, Run, start_run
 from agents.validation import Validation
-from agents.vec_env import FormationVecEnv
+from agents.vec_env import Sb3VecEnv
 from formation_env.seeds import seeds
 from formation_env.settings import ConfigError
 
@@ -39,7 +39,7 @@ def train(run: Run, folder: Path) -> bool:
     first = training_seeds(run.seed, run.agent.rows)[0]
     start_run(run, folder)
     torch.set_num_threads(run.threads)
-    env = FormationVecEnv(run.agent.rows, run.scenario, run.agent.reward_scale, run.agent.action_scale, stagger=True)
+    env = Sb3VecEnv(run.agent.rows, run.scenario, run.agent.reward_scale, run.agent.throttle_power, stagger=True)
     model = make_model(run.agent, env, run.seed)
     env.seed(first)
     model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
+from agents.throttle import throttle
 from formation_env.envs import FormationVectorEnv, interface
 from formation_env.evaluation import scenario_of
 from formation_env.scenario import Scenario
@@ -18,7 +19,7 @@ Infos = list[dict[str, Any]]
 Row = dict[str, Any]
 
 
-class FormationVecEnv(VecEnv):
+class Sb3VecEnv(VecEnv):
     """Rows of a `FormationVectorEnv` as Stable-Baselines3 wants them.
 
     The info of a row is empty but at the end of its episode; then it has `terminal_observation`,
@@ -31,7 +32,7 @@ class FormationVecEnv(VecEnv):
         num_envs: int,
         scenario: str | Path | Scenario,
         reward_scale: float = 1.0,
-        action_scale: float = 1.0,
+        throttle_power: float = 1.0,
         stagger: bool = False,
     ) -> None:
         """Make the environment.
@@ -40,13 +41,13 @@ class FormationVecEnv(VecEnv):
             num_envs: rows.
             scenario: a registered id, a scenario's name or path, or a Scenario.
             reward_scale: rewards are multiplied by this, units per m/s.
-            action_scale: actions are multiplied by this: 1 becomes this share of the greatest thrust.
+            throttle_power: p of the thrust sign(z) |z|^p that an action z stands for; see `agents.throttle`.
             stagger: begin the rows' episodes evenly spread over an episode's length, not all at once, so that each
                 rollout sees all parts of the mission. Until a row's first end it is where coasting took it.
         """
         self.batch = FormationVectorEnv(num_envs, scenario_of(scenario))
         self.reward_scale = reward_scale
-        self.action_scale = action_scale
+        self.throttle_power = throttle_power
         self.stagger = stagger
         self._actions = np.zeros((num_envs, 3), np.float32)
         self._birth_s = time.perf_counter()
@@ -81,7 +82,7 @@ class FormationVecEnv(VecEnv):
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Keep the actions (num_envs, 3) for `step_wait`."""
-        self._actions = self.action_scale * actions
+        self._actions = throttle(actions, self.throttle_power)
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], Infos]:
         """Fly one step in all rows; rows that end begin their next episode."""
