@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.features import features
 from agents.throttle import throttle
 from formation_env.observation import SIZE
 from formation_env.scenario import Scenario
@@ -48,11 +49,13 @@ class Functions:
         activation: one of `ACTIVATIONS`, after every layer but the last.
         squash: one of `SQUASHES`, after the last: to [-1, 1].
         throttle_power: p of the thrust sign(z) |z|^p that the squashed output z stands for.
+        magnification: of the errors that the first layer reads, see `agents.features`.
     """
 
     activation: str
     squash: str
     throttle_power: float
+    magnification: float
 
     def __post_init__(self) -> None:
         """Refuse what no actor can be made of."""
@@ -60,12 +63,13 @@ class Functions:
             given = getattr(self, name)
             if given not in known:
                 raise ConfigError(f"{name}: no such function: {given!r}; {nearest(given, known)}")
-        if not 0 < self.throttle_power < math.inf:
-            raise ConfigError(f"throttle_power: must be > 0, got {self.throttle_power}")
+        for name in ("throttle_power", "magnification"):
+            if not 0 < getattr(self, name) < math.inf:
+                raise ConfigError(f"{name}: must be > 0, got {getattr(self, name)}")
 
 
 class Actor:
-    """z = squash(W_L act(... act(W_1 o + b_1)) + b_L), and the action sign(z) |z|^p, in float32.
+    """z = squash(W_L act(... act(W_1 f(o) + b_1)) + b_L), and the action sign(z) |z|^p, in float32.
 
     Attributes:
         layers: weights and biases, first to last.
@@ -103,7 +107,7 @@ class Actor:
         Returns:
             Actions (3,) or (rows, 3), float32 in [-1, 1], in units of max_accel_m_s2; and `state`.
         """
-        x = np.asarray(observation, np.float32)
+        x = features(np.asarray(observation, np.float32), self.functions.magnification)
         for weight, bias in self._hidden:
             x = self._activation(np.dot(x, weight) + bias)
         z = self._squash(np.dot(x, self._last_weight) + self._last_bias)
@@ -157,7 +161,12 @@ def read_actor(path: Path, scenario: Scenario) -> Actor:
     except (OSError, SafetensorError) as error:
         raise ConfigError(f"{path}: cannot be read: {' '.join(str(error).split())}") from None
     try:
-        functions = Functions(metadata["activation"], metadata["squash"], float(metadata["throttle_power"]))
+        functions = Functions(
+            metadata["activation"],
+            metadata["squash"],
+            float(metadata["throttle_power"]),
+            float(metadata["magnification"]),
+        )
         return Actor(_layers(tensors), functions, scenario)
     except KeyError as error:
         raise ConfigError(f"{path}: {error.args[0]}: missing, so this is no actor") from None

@@ -18,6 +18,7 @@ from formation_env.settings import (
     Positive,
     Probability,
     Real,
+    Text,
     build,
     load_yaml,
     nearest,
@@ -29,6 +30,7 @@ ALGORITHMS: Final[tuple[Algorithm, ...]] = get_args(Algorithm)
 
 Share = Annotated[Probability, Field(gt=0)]
 Count = Annotated[int, Strict(), Field(ge=1)]
+Whole = Annotated[int, Strict(), Field(ge=0)]
 
 
 @settings
@@ -42,6 +44,29 @@ class Network:
 
     hidden: Annotated[tuple[Count, ...], Field(min_length=1)] = (64, 64)
     activation: Literal["tanh", "elu", "relu"] = "tanh"
+
+
+@settings
+class Pretraining:
+    """What comes before reinforcement learning, see `agents.pretraining`.
+
+    Attributes:
+        teacher: the classical policy that is imitated.
+        rounds: flights of imitation; 0 begins with random weights.
+        rows: episodes of each.
+        updates: gradient steps through the model.
+        episodes: recorded episodes that the gradient is taken over.
+        batch: of these, in each step.
+        learning_rate: greatest; it falls to nearly nothing with the cosine.
+    """
+
+    teacher: Text = "lqr"
+    rounds: Whole = 3
+    rows: Count = 96
+    updates: Whole = 300
+    episodes: Count = 2048
+    batch: Count = 128
+    learning_rate: Positive = 1e-3
 
 
 @settings
