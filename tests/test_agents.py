@@ -10,11 +10,10 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from agents import load_policy
 from agents.__main__ import INTERRUPTED, MISTAKE, app
 from agents.plan import plan_run
 from agents.report import learned, parse_models
-from agents.runs import CURVE, LAST_MODEL, MODEL, RUN, Run, load_run, save_model, start_run
+from agents.runs import CURVE, LAST_MODEL, MODEL, RUN, Run, load_policy, load_run, save_model, start_run
 from agents.settings import PPOSettings, SACSettings, load_settings
 from agents.train import train, training_seeds
 from agents.validation import Validation, validate
