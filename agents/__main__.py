@@ -95,9 +95,7 @@ def export(
 @app.command()
 def evaluate(
     source: Annotated[Path, typer.Argument(help="A .safetensors file, a run's folder, or your own SB3 model (.zip).")],
-    env: Annotated[
-        str | None, typer.Option(help="Where to fly; else where it was trained, if the file says so.")
-    ] = None,
+    env: Annotated[str | None, typer.Option(help="Where to fly; else where it was trained.")] = None,
     episodes: Annotated[int, typer.Option(min=1, help="Test seeds.")] = 100,
     bound_episodes: Annotated[int, typer.Option(min=0, help="Of these, seeds held against the bound; 0 is none.")] = 20,
     bounds: Annotated[Path, typer.Option(help="Folder that keeps the bounds.")] = Path("reports/bounds"),
@@ -108,7 +106,7 @@ def evaluate(
     with _plain_errors():
         from agents.evaluate import choose, score
 
-        if allow_pickle:
+        if allow_pickle and source.suffix == ".zip":
             typer.echo(f"warning: {source}: what it holds pickled is being run", err=True)
         policy, scenario = choose(source, env, allow_pickle, throttle_power)
         typer.echo(score(policy, scenario, episodes, bound_episodes, bounds).to_string(float_format="{:.4g}".format))
@@ -116,7 +114,7 @@ def evaluate(
 
 @app.command()
 def report(
-    model: Annotated[list[str], typer.Option(help="LABEL=FOLDER of a run; a label may have a run per scenario.")],
+    model: Annotated[list[str] | None, typer.Option(help="LABEL=PATH, as of evaluate; else the shipped ones.")] = None,
     env: Annotated[list[str] | None, typer.Option(help="Environments; else those of the models.")] = None,
     episodes: Annotated[int, typer.Option(min=1, help="Test episodes per environment.")] = 100,
     out: Annotated[Path, typer.Option(help="Folder of the report.")] = Path("reports"),
@@ -125,7 +123,7 @@ def report(
     with _plain_errors():
         from agents.report import report_models
 
-        typer.echo(report_models(model, env, episodes, out, _command()))
+        typer.echo(report_models(model or [], env, episodes, out, _command()))
 
 
 if __name__ == "__main__":

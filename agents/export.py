@@ -13,7 +13,6 @@ from scipy import stats
 
 from agents.actor import Actor, to_bytes
 from agents.convert import actor_of_run
-from agents.curve import read_curve
 from agents.graph import to_onnx
 from agents.runs import Run
 from agents.shipped import CARD, GRAPH, TENSORS, Card, Interval, Trained, policy_name, sha256
@@ -91,6 +90,8 @@ def _open(folders: Sequence[Path]) -> list[tuple[Path, Run, Actor]]:
 
 def _examine(folder: Path, run: Run, actor: Actor) -> Candidate:
     """Fly a policy on the validation and on the test seeds."""
+    from agents.curve import read_curve
+
     validation = evaluate(actor, run.scenario, seeds("validation", VALIDATION_EPISODES))
     episodes = evaluate(actor, run.scenario, seeds("test", TEST_EPISODES))
     trained = Trained(

@@ -12,12 +12,11 @@ from typer.testing import CliRunner
 
 from agents.__main__ import INTERRUPTED, MISTAKE, app
 from agents.plan import plan_run
-from agents.report import learned, parse_models
 from agents.runs import CURVE, LAST_MODEL, MODEL, RUN, Run, load_policy, load_run, save_model, start_run
 from agents.settings import PPOSettings, SACSettings, load_settings
 from agents.train import train, training_seeds
 from agents.validation import Validation, validate
-from formation_env import ConfigError, FormationEnv, Scenario
+from formation_env import ConfigError, FormationEnv
 from formation_env.evaluation import evaluate
 from formation_env.files import replacing
 from formation_env.seeds import seeds
@@ -243,27 +242,6 @@ def test_a_folder_without_run_or_model_is_one_line(tmp_path: Path) -> None:
     (tmp_path / RUN).write_text(json.dumps(data))
     with pytest.raises(ConfigError, match=r"settings.json: agent: gamma: must be less than or equal to 1, got 2"):
         load_policy(tmp_path)
-
-
-def test_the_report_flies_a_model_on_its_own_scenario_only(finished: tuple[Run, Path]) -> None:
-    """An observation is scaled by its scenario, so a model means nothing on another."""
-    run, folder = finished
-    policy = load_policy(folder)
-    factory = learned("mine", [policy])
-    assert factory(Scenario(**vars(run.scenario))) is policy
-    assert factory(Scenario(**{**vars(run.scenario), "process_noise_m_s2": 0.0})) is None
-    with pytest.raises(ConfigError, match="mine: two runs were trained on the same scenario"):
-        learned("mine", [policy, load_policy(folder)])
-
-
-def test_models_of_the_report_are_label_and_folder() -> None:
-    """A label may have several runs; it may not hide a classical policy."""
-    assert parse_models(["a=x", "b=y", "a=z=1"]) == {"a": [Path("x"), Path("z=1")], "b": [Path("y")]}
-    for wrong in ("runs/ppo", "=x", "a="):
-        with pytest.raises(ConfigError, match="must be LABEL=FOLDER"):
-            parse_models([wrong])
-    with pytest.raises(ConfigError, match="'zero' is the name of a classical policy"):
-        parse_models(["zero=x"])
 
 
 def test_the_curve_is_drawn_and_names_what_is_missing(finished: tuple[Run, Path], tmp_path: Path) -> None:
