@@ -1,6 +1,7 @@
 """Train policies, draw their learning curves, and report on them beside the classical ones."""
 
 import contextlib
+import math
 import shlex
 import sys
 from collections.abc import Iterator
@@ -43,27 +44,61 @@ def _command() -> str:
 
 @app.command()
 def train(
-    algorithm: Annotated[str, typer.Argument(help="ppo or sac.")],
-    env: Annotated[str, typer.Argument(help="A registered id, or a scenario's name or YAML file.")],
-    steps: Annotated[int, typer.Option(min=1, help="Environment steps to train for.")],
-    out: Annotated[Path, typer.Option(help="Folder of the run; must not hold one yet.")],
-    seed: Annotated[int, typer.Option(min=0, help="Of the network, the exploration and the episodes.")] = 0,
-    rows: Annotated[int | None, typer.Option(min=1, help="Environments side by side; else as in the file.")] = None,
+    context: typer.Context,
+    algorithm: Annotated[str | None, typer.Argument(help="ppo or sac.")] = None,
+    env: Annotated[str | None, typer.Argument(help="A registered id, or a scenario's name or YAML file.")] = None,
     config: Annotated[Path | None, typer.Option(help="Hyperparameters; else configs/agents/ALGORITHM.yaml.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the network, the exploration and the episodes.")] = 0,
+    steps: Annotated[int | None, typer.Option(min=1, help="Environment steps; else as in the file.")] = None,
+    out: Annotated[Path | None, typer.Option(help="New folder of the run; else runs/ALGORITHM_ENV_seedN.")] = None,
+    start: Annotated[Path | None, typer.Option(help="Actor (.safetensors) to start from, not random weights.")] = None,
+    resume: Annotated[Path | None, typer.Option(help="Folder of a run to go on with; all else is as it was.")] = None,
+    time_limit: Annotated[float, typer.Option(min=0, help="Minutes after which to save and stop.")] = math.inf,
+    rows: Annotated[int | None, typer.Option(min=1, help="Environments side by side; else as in the file.")] = None,
     validations: Annotated[int, typer.Option(min=1, help="Validations over the run.")] = 20,
     validation_episodes: Annotated[int, typer.Option(min=2, help="Episodes of each validation.")] = 64,
-    threads: Annotated[int, typer.Option(min=1, help="Threads of torch; more help only on an idle machine.")] = 1,
+    threads: Annotated[int, typer.Option(min=1, help="Threads of torch.")] = 2,
 ) -> None:
-    """Train a policy; keep the best on the validation seeds. Ctrl-C saves and ends."""
+    """Train a policy; keep the best on the validation seeds. Ctrl-C saves and ends; --resume FOLDER goes on."""
     with _plain_errors():
-        from agents.plan import plan_run
+        from agents.plan import default_folder, plan_run
+        from agents.train import resume as resume_run
         from agents.train import train as train_run
 
-        run = plan_run(algorithm, env, steps, seed, rows, config, validations, validation_episodes, threads, _command())
-        if not train_run(run, out):
-            typer.echo(f"interrupted; what was learnt up to now is in {out}", err=True)
-            raise typer.Exit(INTERRUPTED)
-        typer.echo(f"the best model is {out / 'model.zip'}, its learning curve {out / 'validation.csv'}")
+        if resume is not None:
+            _check_alone(context, resume)
+            _tell_end(resume_run(resume, 60 * time_limit), resume)
+            return
+        if algorithm is None or env is None:
+            raise ConfigError("train: give an algorithm and an environment, or --resume FOLDER")
+        run = plan_run(
+            algorithm, env, steps, seed, rows, config, validations, validation_episodes, threads, start, _command()
+        )
+        folder = out or default_folder(run)
+        _tell_end(train_run(run, folder, 60 * time_limit), folder)
+
+
+def _check_alone(context: typer.Context, folder: Path) -> None:
+    """Refuse what is given beside --resume and would make it another run."""
+    from agents.runs import load_run
+
+    run = load_run(folder)
+    for name, given in context.params.items():
+        source = context.get_parameter_source(name)
+        if name in ("resume", "time_limit") or source is None or source.name == "DEFAULT":
+            continue
+        if name not in ("algorithm", "env") or given != getattr(run, name):
+            raise ConfigError(f"--resume: {folder} goes on as it began: {run.algorithm} {run.env}; leave out {name}")
+
+
+def _tell_end(outcome: str, folder: Path) -> None:
+    """Say how a training ended, and what is to be done then."""
+    if outcome == "finished":
+        typer.echo(f"the best policy is {folder / 'best.safetensors'}, its learning curve {folder / 'validation.csv'}")
+        return
+    typer.echo(f"{outcome}; go on with: python -m agents train --resume {shlex.quote(str(folder))}", err=True)
+    if outcome == "interrupted":
+        raise typer.Exit(INTERRUPTED)
 
 
 @app.command()

@@ -9,7 +9,8 @@ from zipfile import BadZipFile, ZipFile
 
 import pandas as pd
 
-from agents.actor import ACTIONS
+from agents.actor import ACTIONS, Actor
+from agents.runs import load_best
 from agents.shipped import load_policy
 from agents.throttle import throttle
 from baselines import fuel_optimal, regret
@@ -45,20 +46,13 @@ class Sb3Policy:
         return throttle(z, self.throttle_power), state
 
 
-def open_policy(source: Path) -> Any:
+def open_policy(source: Path) -> Actor:
     """A policy that can be read without unpickling: a .safetensors file with its card, or the folder of a run.
-
-    Returns:
-        Its `Actor`, whose `scenario` is what it was trained on.
 
     Raises:
         ConfigError: it is neither, or faulty.
     """
-    if not source.is_dir():
-        return load_policy(source)
-    from agents.convert import actor_of_run
-
-    return actor_of_run(source)[1]
+    return load_best(source)[1] if source.is_dir() else load_policy(source)
 
 
 def open_model(path: Path, allow_pickle: bool, throttle_power: float) -> Sb3Policy:

@@ -12,9 +12,8 @@ import pandas as pd
 from scipy import stats
 
 from agents.actor import Actor, to_bytes
-from agents.convert import actor_of_run
 from agents.graph import to_onnx
-from agents.runs import Run
+from agents.runs import Run, load_best
 from agents.shipped import CARD, GRAPH, TENSORS, Card, Interval, Trained, policy_name, sha256
 from formation_env.evaluation import evaluate, summarise
 from formation_env.files import write_files
@@ -78,7 +77,7 @@ def _open(folders: Sequence[Path]) -> list[tuple[Path, Run, Actor]]:
     Raises:
         ConfigError: two differ in more than their seeds, or not even in these.
     """
-    opened = [(folder, *actor_of_run(folder)) for folder in folders]
+    opened = [(folder, *load_best(folder)) for folder in folders]
     for (one, run, _), (other, another, _) in itertools.combinations(opened, 2):
         if (run.algorithm, run.env, run.scenario) != (another.algorithm, another.env, another.scenario):
             theirs, ours = f"{another.algorithm} on {another.env}", f"{run.algorithm} on {run.env}"

@@ -59,8 +59,7 @@ class Learned:
 @lru_cache
 def _open(source: Path) -> Actor:
     """A policy, read once."""
-    actor: Actor = open_policy(source)
-    return actor
+    return open_policy(source)
 
 
 def report_models(models: Sequence[str], envs: Sequence[str] | None, episodes: int, out: Path, command: str) -> Path:

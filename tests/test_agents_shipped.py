@@ -10,15 +10,14 @@ import numpy as np
 import onnxruntime
 import pytest
 import torch
+from agents_helpers import small_run
 from typer.testing import CliRunner
 
 from agents import Actor, load_policy, shipped
 from agents.__main__ import MISTAKE, app
 from agents.actor import Functions, read_actor
-from agents.convert import actor_of_run
 from agents.graph import to_onnx
-from agents.plan import plan_run
-from agents.runs import MODEL
+from agents.runs import load_best
 from agents.shipped import CARD, GRAPH, TENSORS, load_with_card, shipped_paths
 from agents.train import train
 from formation_env import ConfigError, FormationVectorEnv, load_scenario
@@ -28,7 +27,6 @@ from formation_env.seeds import seeds
 
 ENV = "FormationInitialization-v0"
 NAME = "ppo_initialization"
-SMALL = "{rows: 8, rollout_steps: 16, batch_size: 64, epochs: 1, network: {hidden: [8]}}"
 RUNTIME_TOLERANCE = 2e-5
 """Actions of order 1 by float32 sums of some hundred terms in another order, and another tanh and power."""
 REFLOWN_TOLERANCE = 1e-3
@@ -39,10 +37,9 @@ REFLOWN_TOLERANCE = 1e-3
 def runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Two trainings of a second, by their seeds."""
     folder = tmp_path_factory.mktemp("runs")
-    (folder / "agent.yaml").write_text(SMALL)
     for seed in (0, 1):
-        settings = {"steps": 256, "validations": 1, "validation_episodes": 2, "config": folder / "agent.yaml"}
-        assert train(plan_run("ppo", ENV, seed=seed, **settings), folder / str(seed))
+        run = small_run(folder, "ppo", env=ENV, seed=seed, steps=256, validations=1)
+        assert train(run, folder / str(seed)) == "finished"
     return [folder / "0", folder / "1"]
 
 
@@ -120,7 +117,7 @@ def test_the_run_best_on_validation_is_shipped(runs: list[Path], exported: Path)
     costs = {run.seed: run.validation_cost_m_s for run in card.runs}
     best = min(costs, key=lambda seed: costs[seed])
     assert card.runs[0].seed == card.training["seed"] == best
-    chosen = actor_of_run(runs[best])[1]
+    chosen = load_best(runs[best])[1]
     flown = evaluate(chosen, ENV, seeds("validation", 500))["return"].mean()
     assert costs[best] == pytest.approx(-flown, rel=1e-6)
     one, two = (run.test_cost_m_s.mean for run in card.runs)
@@ -210,22 +207,6 @@ def test_runs_that_do_not_belong_together_are_refused(runs: list[Path], tmp_path
         assert fault in result.stderr
         assert result.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()
-
-
-def test_a_run_is_read_without_unpickling(runs: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of SB3's file the tensors alone are read: it may hold anything else, and nothing pickled is ever opened."""
-    import pickle
-
-    def refuse(*_: Any, **__: Any) -> None:
-        raise AssertionError("unpickled")
-
-    for name in ("load", "loads", "Unpickler"):
-        monkeypatch.setattr(pickle, name, refuse)
-    assert actor_of_run(runs[0])[1].predict(np.zeros(SIZE, np.float32))[0].shape == (3,)
-    (tmp_path / MODEL).write_text("no model")
-    (tmp_path / "settings.json").write_bytes((runs[0] / "settings.json").read_bytes())
-    with pytest.raises(ConfigError, match=r"model\.zip: damaged, or no model"):
-        actor_of_run(tmp_path)
 
 
 def test_flying_needs_neither_torch_nor_sb3(exported: Path) -> None:

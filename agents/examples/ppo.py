@@ -22,7 +22,7 @@ from agents.throttle import throttle
 from formation_env.evaluation import evaluate
 from formation_env.seeds import seeds
 
-ROWS, LENGTH, BATCH, EPOCHS = 256, 64, 2048, 5
+ROWS, LENGTH, BATCH, EPOCHS = 128, 128, 512, 5
 GAMMA, LAMBDA, CLIP, VALUE_WEIGHT, MAX_GRADIENT = 0.995, 0.95, 0.2, 0.5, 0.5
 LEARNING_RATE, REWARD_SCALE, POWER = 7e-4, 3.0, 3.0
 
@@ -95,7 +95,10 @@ def fly(env: gymnasium.vector.VectorEnv, agent: Agent, observations: Any) -> tup
 
 
 def advantages_of(rewards: Tensor, values: Tensor, next_values: Tensor, ended: Tensor) -> Tensor:
-    """A_t = d_t + gamma lambda A_(t+1) within an episode, with d_t = r_t + gamma V(s_(t+1)) - V(s_t); all (LENGTH, ROWS)."""
+    """A_t = d_t + gamma lambda A_(t+1) up to an episode's end, with d_t = r_t + gamma V(s_(t+1)) - V(s_t).
+
+    All tensors are (LENGTH, ROWS).
+    """
     advantages, later = torch.zeros_like(rewards), torch.zeros_like(rewards[0])
     surprises = rewards + GAMMA * next_values - values
     for step in reversed(range(len(rewards))):
