@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from agents.shipped import SHIPPED
 from formation_env.settings import ConfigError
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -128,8 +129,40 @@ def curve(
 
 
 @app.command()
+def export(
+    runs: Annotated[list[Path], typer.Argument(help="Folders of runs that differ in their training seeds.")],
+    out: Annotated[Path, typer.Option(help="Folder of the policy's files.")] = SHIPPED,
+) -> None:
+    """Write the policy that is best on validation seeds: tensors, a card with all runs' test results, an ONNX graph."""
+    with _plain_errors():
+        from agents.export import export as export_runs
+
+        typer.echo(export_runs(runs, out))
+
+
+@app.command()
+def evaluate(
+    source: Annotated[Path, typer.Argument(help="A .safetensors file, a run's folder, or your own SB3 model (.zip).")],
+    env: Annotated[str | None, typer.Option(help="Where to fly; else where it was trained.")] = None,
+    episodes: Annotated[int, typer.Option(min=1, help="Test seeds.")] = 100,
+    bound_episodes: Annotated[int, typer.Option(min=0, help="Of these, seeds held against the bound; 0 is none.")] = 20,
+    bounds: Annotated[Path, typer.Option(help="Folder that keeps the bounds.")] = Path("reports/bounds"),
+    allow_pickle: Annotated[bool, typer.Option("--allow-pickle", help="Load a .zip, which may run any code.")] = False,
+    throttle_power: Annotated[float | None, typer.Option(help="p, if a .zip's actions z mean sign(z)|z|^p.")] = None,
+) -> None:
+    """Fly a policy on the test seeds: mean and 95 % interval of each metric, and cost over the bound."""
+    with _plain_errors():
+        from agents.evaluate import choose, score
+
+        if allow_pickle and source.suffix == ".zip":
+            typer.echo(f"warning: {source}: what it holds pickled is being run", err=True)
+        policy, scenario = choose(source, env, allow_pickle, throttle_power)
+        typer.echo(score(policy, scenario, episodes, bound_episodes, bounds).to_string(float_format="{:.4g}".format))
+
+
+@app.command()
 def report(
-    model: Annotated[list[str], typer.Option(help="LABEL=FOLDER of a run; a label may have a run per scenario.")],
+    model: Annotated[list[str] | None, typer.Option(help="LABEL=PATH, as of evaluate; else the shipped ones.")] = None,
     env: Annotated[list[str] | None, typer.Option(help="Environments; else those of the models.")] = None,
     episodes: Annotated[int, typer.Option(min=1, help="Test episodes per environment.")] = 100,
     out: Annotated[Path, typer.Option(help="Folder of the report.")] = Path("reports"),
@@ -138,7 +171,7 @@ def report(
     with _plain_errors():
         from agents.report import report_models
 
-        typer.echo(report_models(model, env, episodes, out, _command()))
+        typer.echo(report_models(model or [], env, episodes, out, _command()))
 
 
 if __name__ == "__main__":

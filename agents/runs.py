@@ -7,12 +7,11 @@ from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any, Final
-from zipfile import BadZipFile, is_zipfile
 
 from pydantic import Field, Strict
 
+from agents.actor import Actor, read_actor
 from agents.settings import SETTINGS, AgentSettings, Algorithm
-from agents.throttle import throttle
 from formation_env.files import replacing, write_files
 from formation_env.scenario import Scenario
 from formation_env.settings import ConfigError, Text, build, settings
@@ -122,48 +121,11 @@ def save_model(model: Any, path: Path) -> None:
         model.save(temporary)
 
 
-class LearnedPolicy:
-    """A trained model as a policy, deterministic unless asked otherwise.
-
-    Attributes:
-        scenario: what it was trained on.
-        settings: its hyperparameters.
-    """
-
-    def __init__(self, run: Run, model: Any) -> None:
-        self.scenario = run.scenario
-        self.settings = run.agent
-        self._policy = model.policy
-        self._throttle_power = run.agent.throttle_power
-
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> tuple[Any, Any]:
-        """Actions (3,) or (rows, 3), in units of max_accel_m_s2, for one observation or a batch; and `state`."""
-        actions, _ = self._policy.predict(observation, deterministic=deterministic)
-        return throttle(actions, self._throttle_power), state
-
-
-def load_policy(folder: str | Path, name: str = MODEL) -> LearnedPolicy:
-    """The policy of a training run. SB3's files hold pickled objects, so load only files that you trust.
-
-    Args:
-        folder: the run's.
-        name: of the file, by default the best on the validation seeds.
+def load_best(folder: Path) -> tuple[Run, Actor]:
+    """A run and the policy that was best on its validation seeds. Nothing is unpickled.
 
     Raises:
-        ConfigError: no run or no model is there, or the file is damaged; one line.
+        ConfigError: no run or no policy is there, or a file is damaged; one line.
     """
-    from agents.models import CLASSES
-
-    run, path = load_run(Path(folder)), Path(folder) / name
-    if not path.is_file():
-        raise ConfigError(f"{path}: no such file; the run has saved no model")
-    if not is_zipfile(path):
-        raise ConfigError(f"{path}: damaged, or no model")
-    try:
-        # A policy needs no memory of transitions.
-        model = CLASSES[run.algorithm].load(path, device="cpu", custom_objects={"buffer_size": 1})
-    except (BadZipFile, KeyError, EOFError) as error:
-        raise ConfigError(f"{path}: damaged, or no model: {error}") from None
-    return LearnedPolicy(run, model)
+    run = load_run(folder)
+    return run, read_actor(folder / BEST, run.scenario)

@@ -31,4 +31,4 @@ def small_run(folder: Path, algorithm: str, agent: str = "", **changes: Any) -> 
     (folder / "scenario.yaml").write_text(SCENARIO)
     (folder / "agent.yaml").write_text(SMALL[algorithm] + agent)
     given = {"steps": 512, "validations": 2, "validation_episodes": 4, "config": folder / "agent.yaml", "threads": 1}
-    return plan_run(algorithm, str(folder / "scenario.yaml"), **(given | changes))
+    return plan_run(algorithm, **({"env": str(folder / "scenario.yaml")} | given | changes))

@@ -11,16 +11,15 @@ import pytest
 from agents_helpers import small_run
 from typer.testing import CliRunner
 
-from agents import load_policy
 from agents.__main__ import MISTAKE, app
-from agents.actor import read_actor
+from agents.evaluate import Sb3Policy
+from agents.models import CLASSES
 from agents.plan import plan_run
-from agents.report import learned, parse_models
-from agents.runs import BEST, CHECKPOINT, CURVE, MODEL, RUN, Run, load_run, save_model, start_run
+from agents.runs import BEST, CHECKPOINT, CURVE, MODEL, RUN, Run, load_best, load_run, save_model, start_run
 from agents.settings import PPOSettings, SACSettings, load_settings
 from agents.train import train, training_seeds
 from agents.validation import validate
-from formation_env import ConfigError, FormationEnv, Scenario
+from formation_env import ConfigError
 from formation_env.evaluation import evaluate
 from formation_env.files import replacing
 from formation_env.seeds import seeds
@@ -49,10 +48,11 @@ def test_a_run_leaves_models_settings_curve_and_tensorboard(finished: tuple[Run,
 
 
 def test_the_curve_is_of_the_validation_seeds(finished: tuple[Run, Path]) -> None:
-    """Flown again on these seeds, the best policy gives the curve's best line, which has six digits."""
+    """Flown again on these seeds, actor and SB3's model give the curve's best line, which has six digits."""
     run, folder = finished
     best = pd.read_csv(folder / CURVE)["return"].max()
-    for policy in (load_policy(folder), read_actor(folder / BEST, run.scenario)):
+    model = CLASSES[run.algorithm].load(folder / MODEL, device="cpu")
+    for policy in (load_best(folder)[1], Sb3Policy(model, run.agent.throttle_power)):
         table = evaluate(policy, run.scenario, seeds("validation", 4))
         assert table["return"].mean() == pytest.approx(best, rel=1e-5)
 
@@ -74,38 +74,6 @@ def test_equal_seeds_train_equal_models(tmp_path: Path) -> None:
         tables.append(pd.read_csv(tmp_path / name / CURVE).drop(columns="seconds"))
     pd.testing.assert_frame_equal(tables[0], tables[1], check_exact=True)
     assert not tables[0].equals(tables[2])
-
-
-def test_saved_and_loaded_predictions_are_identical(tmp_path: Path) -> None:
-    """A saved network is the same numbers; its outputs are throttles."""
-    from agents.models import make_model
-    from agents.vec_env import Sb3VecEnv
-
-    run = small_run(tmp_path, "ppo")
-    start_run(run, tmp_path / "run")
-    env = Sb3VecEnv(run.agent.rows, run.scenario)
-    model = make_model(run.agent, env, seed=0)
-    save_model(model, tmp_path / "run" / MODEL)
-    observations = env.reset()
-    expected, _ = model.predict(observations, deterministic=True)
-    loaded, _ = load_policy(tmp_path / "run").predict(observations)
-    np.testing.assert_allclose(loaded, np.sign(expected) * np.abs(expected) ** 3, rtol=1e-6)  # float32's rounding
-    assert loaded.dtype == np.float32
-
-
-def test_a_loaded_policy_flies_one_environment_or_many(finished: tuple[Run, Path]) -> None:
-    """One observation and a batch give the same actions, but for the rounding of float32 sums of other order."""
-    run, folder = finished
-    policy = load_policy(folder)
-    env = FormationEnv(scenario=run.scenario)
-    observations = np.stack([env.reset(seed=seed)[0] for seed in range(5)])
-    batch, state = policy.predict(observations, state="mine")
-    assert batch.shape == (5, 3)
-    assert state == "mine"
-    for observation, action in zip(observations, batch, strict=True):
-        single, _ = policy.predict(observation)
-        assert env.action_space.contains(single)
-        np.testing.assert_allclose(single, action, rtol=0, atol=1e-5)
 
 
 def test_interrupted_saving_leaves_the_old_model(tmp_path: Path) -> None:
@@ -196,39 +164,18 @@ def test_mistakes_on_the_command_line_are_one_line(tmp_path: Path, arguments: li
 def test_a_folder_without_run_or_model_is_one_line(tmp_path: Path) -> None:
     """What is missing or damaged is named."""
     with pytest.raises(ConfigError, match=r"settings\.json: cannot be read: No such file"):
-        load_policy(tmp_path)
+        load_best(tmp_path)
     start_run(small_run(tmp_path, "ppo"), tmp_path)
-    with pytest.raises(ConfigError, match=r"model\.zip: no such file"):
-        load_policy(tmp_path)
-    (tmp_path / MODEL).write_text("no model")
-    with pytest.raises(ConfigError, match=r"model\.zip: damaged"):
-        load_policy(tmp_path)
+    for content in (None, "no actor"):
+        if content is not None:
+            (tmp_path / BEST).write_text(content)
+        with pytest.raises(ConfigError, match=r"best\.safetensors: cannot be read"):
+            load_best(tmp_path)
     data = json.loads((tmp_path / RUN).read_text())
     data["agent"]["gamma"] = 2
     (tmp_path / RUN).write_text(json.dumps(data))
     with pytest.raises(ConfigError, match=r"settings.json: agent: gamma: must be less than or equal to 1, got 2"):
-        load_policy(tmp_path)
-
-
-def test_the_report_flies_a_model_on_its_own_scenario_only(finished: tuple[Run, Path]) -> None:
-    """An observation is scaled by its scenario, so a model means nothing on another."""
-    run, folder = finished
-    policy = load_policy(folder)
-    factory = learned("mine", [policy])
-    assert factory(Scenario(**vars(run.scenario))) is policy
-    assert factory(Scenario(**{**vars(run.scenario), "process_noise_m_s2": 0.0})) is None
-    with pytest.raises(ConfigError, match="mine: two runs were trained on the same scenario"):
-        learned("mine", [policy, load_policy(folder)])
-
-
-def test_models_of_the_report_are_label_and_folder() -> None:
-    """A label may have several runs; it may not hide a classical policy."""
-    assert parse_models(["a=x", "b=y", "a=z=1"]) == {"a": [Path("x"), Path("z=1")], "b": [Path("y")]}
-    for wrong in ("runs/ppo", "=x", "a="):
-        with pytest.raises(ConfigError, match="must be LABEL=FOLDER"):
-            parse_models([wrong])
-    with pytest.raises(ConfigError, match="'zero' is the name of a classical policy"):
-        parse_models(["zero=x"])
+        load_best(tmp_path)
 
 
 def test_the_curve_is_drawn_and_names_what_is_missing(finished: tuple[Run, Path], tmp_path: Path) -> None:
