@@ -69,7 +69,7 @@ def train(
     rows: Annotated[int | None, typer.Option(min=1, help="Environments side by side; else as in the file.")] = None,
     validations: Annotated[int, typer.Option(min=1, help="Validations over the run.")] = 20,
     validation_episodes: Annotated[int, typer.Option(min=2, help="Episodes of each validation.")] = 64,
-    threads: Annotated[int, typer.Option(min=1, help="Threads of torch.")] = 2,
+    threads: Annotated[int, typer.Option(min=1, help="Threads of torch; more help on an idle machine only.")] = 1,
 ) -> None:
     """Train a policy; keep the best on the validation seeds. Ctrl-C saves and ends; --resume FOLDER goes on."""
     with _plain_errors():
@@ -111,6 +111,19 @@ def _tell_end(outcome: str, folder: Path) -> None:
     typer.echo(f"{outcome}; go on with: python -m agents train --resume {shlex.quote(str(folder))}", err=True)
     if outcome == "interrupted":
         raise typer.Exit(INTERRUPTED)
+
+
+@app.command()
+def bench(
+    env: Annotated[str, typer.Argument(help="A registered id, or a scenario.")] = "FormationKeeping-v0",
+    threads: Annotated[list[int], typer.Option(min=1, help="Threads of torch.")] = [1, 2],  # noqa: B006
+    rounds: Annotated[int, typer.Option(min=1, help="Rollouts with their updates; the fastest counts.")] = 5,
+) -> None:
+    """Print how fast PPO learns with its default settings, and the environment's share of that time."""
+    with _plain_errors():
+        from agents.bench import table
+
+        typer.echo(f"PPO on {env}\n{table(env, threads, rounds)}")
 
 
 @app.command()

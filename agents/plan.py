@@ -19,7 +19,7 @@ def plan_run(
     config: Path | None = None,
     validations: int = 20,
     validation_episodes: int = 64,
-    threads: int = 2,
+    threads: int = 1,
     start: Path | None = None,
     command: str = "",
 ) -> Run:

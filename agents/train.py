@@ -101,10 +101,14 @@ def _learn(model: BaseAlgorithm, run: Run, folder: Path, state: State | None, ti
             return "out of time" if time.perf_counter() > ends_s else None
 
         validation = Validation(run, folder, bar, must_end, state)
-        model.learn(run.steps - model.num_timesteps, validation, reset_num_timesteps=state is None)
-        if validation.outcome is None:
-            validation.note()
-    model.logger.close()
+        try:
+            model.learn(run.steps - model.num_timesteps, validation, reset_num_timesteps=state is None)
+            if validation.outcome is None:
+                validation.note()
+        except KeyboardInterrupt:  # the second one; the last checkpoint stays
+            validation.outcome = "interrupted"
+        finally:
+            model.logger.close()
     return validation.outcome or "finished"
 
 

@@ -221,3 +221,16 @@ def test_stable_baselines_own_vectorised_environment_works() -> None:
     action, _ = model.predict(env.reset())
     assert action.shape == (2, 3)
     assert load_scenario("keeping") == env.get_attr("unwrapped")[0].scenario
+
+
+def test_rows_go_on_from_what_they_remember(scenario: Scenario) -> None:
+    """Put back in another environment, rows fly the same to the last bit, over ends and the episodes after them."""
+    one, other = Sb3VecEnv(ROWS, scenario), Sb3VecEnv(ROWS, scenario)
+    one.seed(8)
+    one.reset()
+    for action in actions(7):
+        observations = one.step(action)[0]
+    other.recall(one.memory(), observations)
+    for action in actions(50):
+        for mine, theirs in zip(one.step(action)[:3], other.step(action)[:3], strict=True):
+            np.testing.assert_array_equal(mine, theirs)
