@@ -16,6 +16,7 @@ from baselines.commands import (
     BoundEpisodes,
     Envs,
     Episodes,
+    Fine,
     Out,
     Processes,
     Resume,
@@ -177,9 +178,10 @@ def report(
     model: Annotated[list[str] | None, typer.Option(help="LABEL=PATH, as of evaluate; else the shipped ones.")] = None,
     env: Envs = None,
     episodes: Episodes = 100,
-    slow_episodes: SlowEpisodes = 8,
+    slow_episodes: SlowEpisodes = 5,
     sweep_episodes: SweepEpisodes = 10,
     bound_episodes: BoundEpisodes = 2,
+    fine: Fine = False,
     resume: Resume = False,
     out: Out = Path("reports"),
     processes: Processes = PROCESSES,
@@ -190,7 +192,7 @@ def report(
         from agents.report import report_models
         from baselines.report import Wanted
 
-        wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, resume)
+        wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, not fine, resume)
         return report_models(model or [], env, wanted, out, _command(), processes)
 
     run_report("report", out, write)

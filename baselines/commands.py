@@ -21,6 +21,7 @@ Episodes = Annotated[int, typer.Option(min=1, help="Episodes per policy and envi
 SlowEpisodes = Annotated[int, typer.Option(min=1, help="Of these the first ones, for mpc, which is slow.")]
 SweepEpisodes = Annotated[int, typer.Option(min=0, help="For fronts and robustness; 0 leaves them out.")]
 BoundEpisodes = Annotated[int, typer.Option(min=0, help="Of these, for the fronts' bound; 0 is none.")]
+Fine = Annotated[bool, typer.Option("--fine", help="Fronts and robustness at more values.")]
 Out = Annotated[Path, typer.Option(file_okay=False, help="Folder to write to.")]
 Processes = Annotated[int, typer.Option(min=1, help="To fly in.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Keep finished flights in OUT/flown; fly none of them again.")]
@@ -31,9 +32,10 @@ def report(
     env: Envs = None,
     policy: Policies = None,
     episodes: Episodes = 100,
-    slow_episodes: SlowEpisodes = 8,
+    slow_episodes: SlowEpisodes = 5,
     sweep_episodes: SweepEpisodes = 10,
     bound_episodes: BoundEpisodes = 2,
+    fine: Fine = False,
     resume: Resume = False,
     out: Out = Path("reports"),
     processes: Processes = PROCESSES,
@@ -44,7 +46,7 @@ def report(
     def write() -> Path:
         from baselines.report import Wanted, write_report
 
-        wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, resume)
+        wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, not fine, resume)
         return write_report(classical(policy or ()), env or list(ENV_IDS), wanted, out, command, processes)
 
     run_report("report", out, write)

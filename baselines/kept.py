@@ -1,16 +1,19 @@
 """Tables of finished jobs on disk, so that what was interrupted goes on."""
 
 import hashlib
+import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
+from zipfile import BadZipFile
 
+import numpy as np
 import pandas as pd
 
 import formation_env
 from baselines.jobs import Name, Progress, Work
-from formation_env.files import write_texts
+from formation_env.files import replacing
 
 
 class Tabled(Work, Protocol):
@@ -32,7 +35,7 @@ class Kept:
 
     Attributes:
         job: what is flown.
-        path: the file, a CSV table.
+        path: the file, an archive of its columns.
     """
 
     job: Tabled
@@ -55,7 +58,7 @@ class Kept:
             return table
         table = self.job.fly(progress)
         if table is not None:
-            write_texts(self.path.parent, {self.path.name: table.to_csv(index=False)})
+            write(self.path, table)
         return table
 
 
@@ -74,15 +77,29 @@ def keep(jobs: Mapping[Name, Tabled], folder: Path | None) -> dict[Name, Work]:
 def path_of(folder: Path, job: Tabled) -> Path:
     """The file of a job; its name has the hash of all that its table depends on."""
     text = repr((formation_env.__version__, job.key))
-    return folder / f"{type(job).__name__.lower()}_{hashlib.sha256(text.encode()).hexdigest()[:24]}.csv"
+    return folder / f"{type(job).__name__.lower()}_{hashlib.sha256(text.encode()).hexdigest()[:24]}.npz"
+
+
+def write(path: Path, table: pd.DataFrame) -> None:
+    """Keep a table of numbers, flags and texts; the file is complete or not there.
+
+    Raises:
+        OSError: the folder cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    columns = {str(name): values.to_numpy() for name, values in table.items()}
+    for name, values in columns.items():
+        if values.dtype.kind not in "biuf":
+            columns[name] = values.astype(str)  # pandas keeps texts as objects, which numpy would pickle
+    with replacing(path) as temporary:
+        np.savez_compressed(temporary, **columns)
 
 
 def read(path: Path) -> pd.DataFrame | None:
-    """A kept table, every number as it was; None if there is none, or the file is not a table."""
+    """A kept table; None if there is none, or the file is not a whole one."""
     try:
-        # only what pandas writes for a missing number is one, and a label of digits is no number
-        return pd.read_csv(
-            path, float_precision="round_trip", keep_default_na=False, na_values=[""], dtype={"env": str, "policy": str}
-        )
-    except (OSError, ValueError):
+        # from memory: of a broken archive numpy leaves the file open
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as arrays:
+            return pd.DataFrame(dict(arrays))
+    except (OSError, ValueError, KeyError, EOFError, TypeError, BadZipFile):
         return None

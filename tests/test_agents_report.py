@@ -1,6 +1,7 @@
 """Learned policies beside classical ones: the report, and the evaluation of a policy of one's own."""
 
 import json
+import pickle
 import subprocess
 import sys
 import zipfile
@@ -22,6 +23,7 @@ from agents.shipped import CARD, TENSORS, policy_name, sha256
 from agents.vec_env import Sb3VecEnv
 from baselines.factories import describe
 from baselines.registry import POLICIES
+from baselines.sweep.flights import points
 from formation_env import ENV_IDS, ConfigError, Scenario, load_scenario
 from formation_env.evaluation import evaluate, summarise
 from formation_env.observation import SIZE
@@ -121,6 +123,17 @@ def test_what_a_factory_tells_changes_with_the_policy(policies: Path) -> None:
     told = describe(ppo, initialization), describe(sac, initialization)
     assert told[0] != told[1]
     assert json.loads(json.dumps(told[0])) == told[0]
+
+
+def test_fronts_fly_a_learned_policy_as_it_is(policies: Path) -> None:
+    """It is not told the price of errors: at a hundred times the price, the same flights cost so much more for them."""
+    learned = Learned("ppo", (policies / f"ppo_initialization{TENSORS}",))
+    factory = pickle.loads(pickle.dumps(learned))  # as it gets to another process
+    front = points({START: load_scenario("initialization")}, {"ppo": factory}, seeds("test", EPISODES), 0)
+    cheap, dear = (front[f"{START} error_weight {value}"].fly(lambda steps: None) for value in (0.1, 10))
+    np.testing.assert_array_equal(cheap["delta_v_m_s"], dear["delta_v_m_s"])
+    paid = [table["cost_m_s"] - table["delta_v_m_s"] for table in (cheap, dear)]
+    np.testing.assert_allclose(paid[1], 100 * paid[0], rtol=1e-9)  # sums round differently
 
 
 def test_two_policies_of_one_scenario_need_two_labels(policies: Path) -> None:

@@ -17,7 +17,7 @@ from baselines.factories import Classical
 from baselines.registry import make_policy
 from baselines.report import style
 from baselines.sweep.figures import front_figure, looks_of, robustness_figure
-from baselines.sweep.flights import BOUND, COLUMNS, METRICS, Point, mean_hold_error_m
+from baselines.sweep.flights import BOUND, COLUMNS, METRICS, Point, mean_hold_error_m, points
 from baselines.sweep.report import FILES, Wanted, write_sweep
 from baselines.sweep.report_section import expensive, reading
 from baselines.sweep.variations import FRONT, VARIATIONS, lost_share
@@ -96,6 +96,25 @@ def test_the_variations_hold_the_scenarios_own_value(name: str) -> None:
         assert VARIATIONS[quantity].vary(scenario, nominal)[0] == scenario
     flown, _ = VARIATIONS["ballistic_coefficient"].vary(scenario, 0.0)
     assert (flown.spacecraft, flown.leader, flown.belief) == (scenario.spacecraft, scenario.leader, scenario.belief)
+
+
+def test_a_quick_look_has_ends_and_middle() -> None:
+    """Every quantity keeps the scenario's own value and both ends, and flies no more values than before."""
+    for variation in VARIATIONS.values():
+        assert {variation.values[0], variation.values[len(variation.values) // 2]} <= set(variation.few)
+        assert variation.values[-1] == variation.few[-1]
+        assert set(variation.few) <= set(variation.values)
+    assert VARIATIONS[FRONT].few == (0.1, 0.5, 1.0, 2.0, 10.0)
+
+
+def test_the_scenario_itself_is_flown_once() -> None:
+    """Quantities whose own value leaves the scenario as it is share a point, and all of them show it."""
+    made = points({"keeping": load_scenario("keeping")}, POLICIES, (0,), 0)
+    own = [point for point in made.values() if point.flown == point.believed == point.original]
+    (point,) = own
+    assert {quantity for quantity, _ in point.places} >= TOLD | {"thrust_magnitude"}
+    places = [place for point in made.values() for place in point.places]
+    assert len(places) == len(set(places)) == sum(len(item.values) for item in VARIATIONS.values())
 
 
 def test_bursts_have_the_share_and_the_length_asked_for() -> None:
@@ -198,7 +217,7 @@ def test_gains_are_those_of_the_original() -> None:
     """A varied scenario equals no shipped one; it must not fall back to the default gains."""
     scenario = load_scenario("keeping")
     flown, believed = VARIATIONS["outage_length"].vary(scenario, 60.0)
-    point = Point("keeping", "outage_length", 60.0, flown, believed, scenario, {"smc": Classical("smc")}, (0,))
+    point = Point("keeping", (("outage_length", 60.0),), flown, believed, scenario, {"smc": Classical("smc")}, (0,))
     table = point.fly(lambda _: None)
     own = evaluate(make_policy("smc", "keeping"), flown, [0])
     assert table["cost_m_s"].iloc[0] == -own["return"].iloc[0]

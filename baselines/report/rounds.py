@@ -98,7 +98,7 @@ def _points(
     for env, crew in crews.items() if wanted.sweep_episodes else ():
         own = seeds("test", wanted.sweep_episodes)
         try:
-            made |= points({env: scenarios[env]}, crew, own, bound_episodes) if crew else {}
+            made |= points({env: scenarios[env]}, crew, own, bound_episodes, wanted.coarse) if crew else {}
         except ConfigError as error:
             faults[env] = str(error)
     return made, faults

@@ -13,7 +13,7 @@ from baselines.jobs import Progress, Share
 from formation_env.evaluation import Policy, evaluate, record
 from formation_env.scenario import Scenario
 
-CHUNK: Final = 4
+CHUNK: Final = 5
 """Episodes of a slow policy in one job; fast ones fly all of theirs side by side."""
 SLOW_COST: Final = 40
 """Time of one action of a slow policy, in steps of a batch."""

@@ -76,7 +76,7 @@ def robustness_figure(summary: pd.DataFrame, looks: Looks, aside: Collection[str
                 trace.visible = band.visible = "legendonly"
             figure.add_traces([band, trace], rows=row + 1, cols=column + 1)
         number = "" if index == 0 else str(index + 1)
-        _label(figure, number, VARIATIONS[quantity])
+        _label(figure, number, VARIATIONS[quantity], panel["value"].unique().tolist())
         near = panel[~panel["policy"].isin(aside)]
         _fit(figure, f"yaxis{number}", near[["cost_low_m_s", "cost_high_m_s"]].to_numpy(float))
     return figure.update_layout(legend={"orientation": "h", "x": 0, "y": 1.01, "yanchor": "bottom"})
@@ -104,9 +104,8 @@ def _look(look: Look) -> dict[str, dict[str, object]]:
     return {"line": {"color": look.color, "dash": look.dash, "width": 1.8}, "marker": marker}
 
 
-def _label(figure: go.Figure, number: str, variation: Variation) -> None:
+def _label(figure: go.Figure, number: str, variation: Variation, values: list[float]) -> None:
     """Titles of a panel's axes; the varied values are its ticks."""
-    values = list(variation.values)
     texts = [variation.names.get(value, f"{value:g}") for value in values]
     across = style.axis(variation.label) | {"type": "log" if variation.log else "linear"}
     pad = {"range": [-0.4, len(values) - 0.6]} if variation.names else {}

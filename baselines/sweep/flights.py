@@ -28,12 +28,11 @@ COLUMNS: Final = [*KEYS, "seed", *METRICS, "ended_early"]
 
 @dataclass(frozen=True)
 class Point:
-    """One value of one quantity on one environment, flown by all policies on the same seeds.
+    """One varied environment, flown by all policies on the same seeds.
 
     Attributes:
         env: name of the environment.
-        quantity: what is varied.
-        value: of the quantity.
+        places: quantities and their values that make it; the scenario's own value of several is one point.
         flown: the scenario.
         believed: the scenario that policies are told of.
         original: the scenario that was varied; its gains are used throughout.
@@ -43,8 +42,7 @@ class Point:
     """
 
     env: str
-    quantity: str
-    value: float
+    places: tuple[tuple[str, float], ...]
     flown: Scenario
     believed: Scenario
     original: Scenario
@@ -61,14 +59,15 @@ class Point:
     def key(self) -> Any:
         """All that the table depends on; None if a policy does not tell its settings."""
         told = {name: describe(factory, self.original) for name, factory in self.policies.items()}
-        place = (self.env, self.quantity, self.value, self.flown, self.believed)
+        place = (self.env, self.places, self.flown, self.believed)
         return None if None in told.values() else (*place, told, self.seeds, self.bound_seeds)
 
     def fly(self, progress: Progress) -> pd.DataFrame:
         """Fly it; progress is called with the cost of what was flown since the last call.
 
         Returns:
-            One line per policy and seed: `COLUMNS`; a policy that there is not for the scenario has none.
+            One line per place, policy and seed, `COLUMNS`: the bound's on the front only, and none of a policy that
+            there is not for the scenario.
 
         Raises:
             ConfigError: a policy cannot be made.
@@ -81,11 +80,16 @@ class Point:
             if policy is not None:
                 tables.append(self._fly(name, policy))
             progress(self.flown.num_steps)
+        bounds = []
         for seed in self.bound_seeds:
-            tables.append(self._solve_bound(seed))
+            bounds.append(self._solve_bound(seed))
             progress(self.flown.num_steps)
-        table = pd.concat(tables, ignore_index=True)
-        return table.assign(env=self.env, quantity=self.quantity, value=self.value)[COLUMNS]
+        placed = [
+            table.assign(env=self.env, quantity=quantity, value=value)
+            for quantity, value in self.places
+            for table in (*tables, *(bounds if quantity == FRONT else ()))
+        ]
+        return pd.concat(placed, ignore_index=True)[COLUMNS]
 
     def _fly(self, name: str, policy: Policy) -> pd.DataFrame:
         flown = evaluate(policy, self.flown, self.seeds)
@@ -117,6 +121,7 @@ def points(
     policies: Mapping[str, PolicyFactory],
     seeds: Sequence[int],
     bound_episodes: int,
+    coarse: bool = False,
 ) -> dict[str, Point]:
     """All that a sweep flies, by name.
 
@@ -126,6 +131,7 @@ def points(
         seeds: one per episode, the same everywhere.
         bound_episodes: how many of the seeds the bound is solved on, along the front; none where the truth is
             nonlinear.
+        coarse: a few values of each quantity only.
 
     Raises:
         ConfigError: a price of errors of 0, or a scenario that a variation does not fit.
@@ -135,24 +141,26 @@ def points(
         if scenario.reward.error_weight == 0:
             raise ConfigError(f"sweep: {env}: reward.error_weight: must be > 0 for a front, got 0")
         solved = tuple(seeds)[:bound_episodes] if scenario.dynamics != NONLINEAR else ()
-        for quantity, value, flown, believed in _varied(env, scenario):
-            made[f"{env} {quantity} {value:g}"] = Point(
+        places: dict[tuple[Scenario, Scenario], list[tuple[str, float]]] = {}
+        for quantity, value, flown, believed in _varied(env, scenario, coarse):
+            places.setdefault((flown, believed), []).append((quantity, value))
+        for (flown, believed), made_by in places.items():
+            made[f"{env} {made_by[0][0]} {made_by[0][1]:g}"] = Point(
                 env=env,
-                quantity=quantity,
-                value=value,
+                places=tuple(made_by),
                 flown=flown,
                 believed=believed,
                 original=scenario,
                 policies=policies,
                 seeds=tuple(seeds),
-                bound_seeds=solved if quantity == FRONT else (),
+                bound_seeds=solved if any(quantity == FRONT for quantity, _ in made_by) else (),
             )
     return made
 
 
-def _varied(env: str, scenario: Scenario) -> Iterator[tuple[str, float, Scenario, Scenario]]:
+def _varied(env: str, scenario: Scenario, coarse: bool) -> Iterator[tuple[str, float, Scenario, Scenario]]:
     for quantity, variation in VARIATIONS.items():
-        for value in variation.values:
+        for value in variation.few if coarse else variation.values:
             try:
                 flown, believed = variation.vary(scenario, value)
             except ValidationError as error:
@@ -177,8 +185,12 @@ class Sweep:
 
     @classmethod
     def join(cls, tables: Sequence[pd.DataFrame], faults: dict[str, str]) -> Self:
-        """The sweep from the tables of its points."""
+        """The sweep from the tables of its points: by environment, quantity and value, the rest as it was flown."""
         episodes = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=COLUMNS)
+        places = {name: place for place, name in enumerate((*episodes["env"].unique(), *VARIATIONS))}
+        for key in ("value", "quantity", "env"):
+            sort = None if key == "value" else lambda names: names.map(places)
+            episodes = episodes.sort_values(key, key=sort, kind="stable", ignore_index=True)
         return cls(episodes, summarise(episodes), faults)
 
     def of(self, env: str) -> Self:
@@ -189,7 +201,10 @@ class Sweep:
     def as_data(self) -> dict[str, Any]:
         """Means, intervals and what was varied, as plain data."""
         return {
-            "quantities": {name: {"label": item.label, "values": item.values} for name, item in VARIATIONS.items()},
+            "quantities": {
+                name: {"label": VARIATIONS[str(name)].label, "values": values.unique().tolist()}
+                for name, values in self.summary.groupby("quantity", sort=False)["value"]
+            },
             "summary": self.summary.to_dict(orient="records"),
             "left_out": self.faults,
         }

@@ -30,7 +30,7 @@ def section(index: int, scenario: Scenario, sweep: Sweep, looks: Looks) -> dict[
     bound = sweep.episodes[sweep.episodes["policy"] == BOUND]
     return {
         "weight": scenario.reward.error_weight,
-        "prices": VARIATIONS[FRONT].values,
+        "prices": summary.loc[summary["quantity"] == FRONT, "value"].unique().tolist(),
         "episodes": sweep.episodes["seed"].nunique(),
         "bound_episodes": bound["seed"].nunique(),
         "aside": aside,
