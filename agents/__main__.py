@@ -11,6 +11,19 @@ from typing import Annotated
 import typer
 
 from agents.shipped import SHIPPED
+from baselines.commands import (
+    PROCESSES,
+    BoundEpisodes,
+    Envs,
+    Episodes,
+    Fine,
+    Out,
+    Processes,
+    Resume,
+    SlowEpisodes,
+    SweepEpisodes,
+    run_report,
+)
 from formation_env.settings import ConfigError
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -163,15 +176,26 @@ def evaluate(
 @app.command()
 def report(
     model: Annotated[list[str] | None, typer.Option(help="LABEL=PATH, as of evaluate; else the shipped ones.")] = None,
-    env: Annotated[list[str] | None, typer.Option(help="Environments; else those of the models.")] = None,
-    episodes: Annotated[int, typer.Option(min=1, help="Test episodes per environment.")] = 100,
-    out: Annotated[Path, typer.Option(help="Folder of the report.")] = Path("reports"),
+    env: Envs = None,
+    episodes: Episodes = 100,
+    slow_episodes: SlowEpisodes = 5,
+    sweep_episodes: SweepEpisodes = 10,
+    bound_episodes: BoundEpisodes = 2,
+    fine: Fine = False,
+    resume: Resume = False,
+    out: Out = Path("reports"),
+    processes: Processes = PROCESSES,
 ) -> None:
-    """Fly learned and classical policies on the same test seeds: tables and one HTML page."""
-    with _plain_errors():
-        from agents.report import report_models
+    """Fly learned and classical policies on the same test seeds: tables, fronts and robustness on one HTML page."""
 
-        typer.echo(report_models(model or [], env, episodes, out, _command()))
+    def write() -> Path:
+        from agents.report import report_models
+        from baselines.report import Wanted
+
+        wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, not fine, resume)
+        return report_models(model or [], env, wanted, out, _command(), processes)
+
+    run_report("report", out, write)
 
 
 if __name__ == "__main__":

@@ -2,15 +2,16 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from agents.actor import Actor, to_bytes
 from agents.evaluate import open_policy
 from agents.shipped import CARD, read_card, sha256, shipped_paths
-from baselines.registry import POLICIES, SLOW, make_policy
-from baselines.report import write_report
+from baselines.factories import classical
+from baselines.registry import POLICIES
+from baselines.report import Wanted, write_report
 from formation_env.envs import ENV_IDS
 from formation_env.evaluation import scenario_of
 from formation_env.scenario import Scenario, scenario_names
@@ -38,7 +39,7 @@ class Learned:
             if scenario in scenarios[:index]:
                 raise ConfigError(f"--model: {self.label}: {self.sources[index]} was trained on what another was, too")
 
-    def __call__(self, original: Scenario, believed: Scenario | None = None) -> Actor | None:
+    def __call__(self, original: Scenario, believed: Scenario) -> Actor | None:
         """The policy for a scenario.
 
         Args:
@@ -49,7 +50,7 @@ class Learned:
 
     def settings(self, original: Scenario) -> dict[str, Any] | None:
         """What tells its policy for a scenario from others, as plain data; None if it has none."""
-        actor = self(original)
+        actor = self(original, original)
         if actor is None:
             return None
         widths = [len(bias) for _, bias in actor.layers]
@@ -62,16 +63,19 @@ def _open(source: Path) -> Actor:
     return open_policy(source)
 
 
-def report_models(models: Sequence[str], envs: Sequence[str] | None, episodes: int, out: Path, command: str) -> Path:
+def report_models(
+    models: Sequence[str], envs: Sequence[str] | None, wanted: Wanted, out: Path, command: str, workers: int = 1
+) -> Path:
     """Write the report with the classical policies and learned ones.
 
     Args:
         models: each LABEL=PATH; policies of several scenarios may share a label. Without any, those that are shipped,
             by their algorithms.
         envs: registered ids, or names or paths of scenarios; by default those of the models, or the registered ones.
-        episodes: test episodes per environment.
+        wanted: how much to fly.
         out: folder of the report.
         command: the command line, to be noted.
+        workers: processes to fly in.
 
     Returns:
         Path of the HTML page.
@@ -85,8 +89,7 @@ def report_models(models: Sequence[str], envs: Sequence[str] | None, episodes: i
     flown = list(envs or (envs_of(learned) if models else ENV_IDS))
     if models:
         _check_flown(learned, flown)
-    classical = {name: partial(make_policy, name) for name in POLICIES if name not in SLOW}
-    return write_report(classical | learned, flown, episodes, out, command)
+    return write_report({**classical(), **learned}, flown, wanted, out, command, workers)
 
 
 def parse_models(models: Sequence[str]) -> dict[str, list[Path]]:

@@ -1,6 +1,9 @@
 """Learned policies beside classical ones: the report, and the evaluation of a policy of one's own."""
 
 import json
+import pickle
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -18,7 +21,9 @@ from agents.evaluate import Sb3Policy, algorithm_of
 from agents.report import Learned, envs_of, parse_models
 from agents.shipped import CARD, TENSORS, policy_name, sha256
 from agents.vec_env import Sb3VecEnv
-from baselines.registry import POLICIES, SLOW
+from baselines.factories import describe
+from baselines.registry import POLICIES
+from baselines.sweep.flights import points
 from formation_env import ENV_IDS, ConfigError, Scenario, load_scenario
 from formation_env.evaluation import evaluate, summarise
 from formation_env.observation import SIZE
@@ -68,13 +73,32 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
+WITHOUT_LEARNING_LIBRARIES = """
+import pathlib, sys
+
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name in ("torch", "stable_baselines3", "tensorboard", "onnx"):
+            raise ModuleNotFoundError(name=name)
+
+sys.meta_path.insert(0, Missing())
+from agents import shipped
+from agents.__main__ import app
+
+shipped.SHIPPED = pathlib.Path(sys.argv.pop(1))
+app()
+"""
+
+
 def test_shipped_policies_stand_in_the_report_by_themselves(policies: Path, tmp_path: Path) -> None:
-    """Without --model each algorithm flies its policy of the environment, beside all classical ones, on equal seeds."""
+    """Without --model each algorithm flies its policy beside all classical ones, on equal seeds, and without torch."""
     out = tmp_path / "reports"
-    result = run("report", "--env", START, "--episodes", EPISODES, "--out", out)
-    assert result.exit_code == 0, result.output
+    few = ["--episodes", EPISODES, "--slow-episodes", 1, "--sweep-episodes", 0, "--processes", 1]
+    command = [sys.executable, "-c", WITHOUT_LEARNING_LIBRARIES, policies, "report", "--env", START, *few, "--out", out]
+    found = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False, timeout=300)
+    assert found.returncode == 0, found.stderr
     table = pd.read_csv(out / "episodes.csv")
-    assert set(table["policy"]) >= (set(POLICIES) - set(SLOW)) | {"ppo", "sac"}
+    assert set(table["policy"]) == {*POLICIES, "ppo", "sac"}
     again = evaluate(shipped.load_policy("sac", START), START, seeds("test", EPISODES))
     own = table[table["policy"] == "sac"]
     np.testing.assert_allclose(own["return"], again["return"], rtol=1e-6)  # decimal numbers in the file
@@ -96,9 +120,20 @@ def test_what_a_factory_tells_changes_with_the_policy(policies: Path) -> None:
     """Flights are kept by it, so it must tell any two policies apart."""
     initialization = load_scenario("initialization")
     ppo, sac = (Learned(name, (policies / f"{name}_initialization{TENSORS}",)) for name in ("ppo", "sac"))
-    told = ppo.settings(initialization), sac.settings(initialization)
+    told = describe(ppo, initialization), describe(sac, initialization)
     assert told[0] != told[1]
     assert json.loads(json.dumps(told[0])) == told[0]
+
+
+def test_fronts_fly_a_learned_policy_as_it_is(policies: Path) -> None:
+    """It is not told the price of errors: at a hundred times the price, the same flights cost so much more for them."""
+    learned = Learned("ppo", (policies / f"ppo_initialization{TENSORS}",))
+    factory = pickle.loads(pickle.dumps(learned))  # as it gets to another process
+    front = points({START: load_scenario("initialization")}, {"ppo": factory}, seeds("test", EPISODES), 0)
+    cheap, dear = (front[f"{START} error_weight {value}"].fly(lambda steps: None) for value in (0.1, 10))
+    np.testing.assert_array_equal(cheap["delta_v_m_s"], dear["delta_v_m_s"])
+    paid = [table["cost_m_s"] - table["delta_v_m_s"] for table in (cheap, dear)]
+    np.testing.assert_allclose(paid[1], 100 * paid[0], rtol=1e-9)  # sums round differently
 
 
 def test_two_policies_of_one_scenario_need_two_labels(policies: Path) -> None:

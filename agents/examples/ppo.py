@@ -22,6 +22,7 @@ from agents.throttle import throttle
 from formation_env.evaluation import evaluate
 from formation_env.seeds import seeds
 
+app = typer.Typer(add_completion=False)
 ROWS, LENGTH, BATCH, EPOCHS = 128, 128, 512, 5
 GAMMA, LAMBDA, CLIP, VALUE_WEIGHT, MAX_GRADIENT = 0.995, 0.95, 0.2, 0.5, 0.5
 LEARNING_RATE, REWARD_SCALE, POWER = 7e-4, 3.0, 3.0
@@ -132,6 +133,7 @@ def learn(agent: Agent, optimizer: torch.optim.Optimizer, rollout: Rollout) -> N
 def train(env_id: str, steps: int, seed: int, reports: int) -> tuple[Agent, list[float]]:
     """Train an agent; the mean costs, m/s, on the validation seeds before, on the way and at the end."""
     torch.manual_seed(seed)
+    torch.set_num_threads(1)  # more only wait for each other on networks so small
     env = gymnasium.make_vec(env_id, ROWS, vectorization_mode="vector_entry_point")
     observations, _ = env.reset(seed=seeds("training", (seed + 1) * ROWS)[-ROWS])
     agent = Agent(env.single_observation_space.shape[0], env.single_action_space.shape[0])
@@ -151,6 +153,7 @@ def _cost(agent: Agent, env_id: str) -> float:
     return -float(evaluate(agent, env_id, seeds("validation", 64))["return"].mean())
 
 
+@app.command()
 def main(
     env_id: Annotated[str, typer.Argument(help="A registered id.")] = "FormationKeeping-v0",
     steps: Annotated[int, typer.Option(min=1, help="Environment steps.")] = 2_000_000,
@@ -162,4 +165,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    app()

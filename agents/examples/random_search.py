@@ -18,6 +18,7 @@ from agents.throttle import throttle
 from formation_env.observation import SLICES
 from formation_env.seeds import seeds
 
+app = typer.Typer(add_completion=False)
 Env = gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]
 SEEN = SLICES["error_log"]
 """The policy looks at the compressed error alone: three positions, three velocities."""
@@ -66,6 +67,7 @@ def search(env_id: str, tries: int, episodes: int, seed: int) -> tuple[NDArray[n
     return best, cost(np.zeros_like(best), validation), cost(best, validation)
 
 
+@app.command()
 def main(
     env_id: Annotated[str, typer.Argument(help="A registered id.")] = "FormationKeeping-v0",
     tries: Annotated[int, typer.Option(min=1)] = 300,
@@ -78,4 +80,4 @@ def main(
 
 
 if __name__ == "__main__":
-    typer.run(main)
+    app()
