@@ -13,15 +13,19 @@ INPUTS := pyproject.toml constraints.txt
 INSTALL = $(PY) -m pip install --quiet -c constraints.txt -e
 
 .DEFAULT_GOAL := help
-.PHONY: help report thesis test check bench clean
+.PHONY: help report report-full thesis test check bench clean
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 
 help: ## Show this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-8s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 report: $(REPORT) ## Classical baselines on the four environments (EPISODES=100 OUT=reports/)
-	$(PY) -m baselines report --episodes $(EPISODES) --out $(OUT)
+	$(PY) -m baselines report --episodes $(EPISODES) --out $(OUT) $(ARGS)
+
+report-full: $(REPORT) ## The same with all seeds for mpc, too, and finer fronts; goes on where it was interrupted
+	$(PY) -m baselines report --episodes $(EPISODES) --slow-episodes $(EPISODES) --sweep-episodes 50 --bound-episodes 20 \
+		--fine --resume --out $(OUT)
 
 thesis: $(REPORT) ## The source thesis's figures and claims, reproduced (OUT=reports/): OUT/thesis/thesis.html
 	$(PY) -m baselines reproduce --out $(patsubst %/,%,$(OUT))/thesis $(ARGS)

@@ -1,6 +1,7 @@
 """A learned policy at run time: a small network in numpy, kept in a safetensors file; no torch, no SB3."""
 
 import itertools
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -55,7 +56,7 @@ class Functions:
     activation: str
     squash: str
     throttle_power: float
-    magnification: float
+    magnification: float = 1.0
 
     def __post_init__(self) -> None:
         """Refuse what no actor can be made of."""
@@ -138,8 +139,11 @@ def to_bytes(actor: Actor) -> bytes:
     tensors: dict[str, Array32] = {}
     for index, (weight, bias) in enumerate(actor.layers):
         tensors |= {f"layers.{index}.weight": np.ascontiguousarray(weight), f"layers.{index}.bias": bias}
-    metadata = {name: str(value) for name, value in asdict(actor.functions).items()}
-    return bytes(save(tensors, metadata))
+    content = bytes(save(tensors, {name: str(value) for name, value in asdict(actor.functions).items()}))
+    # The header is JSON behind its length; its metadata come in random order, but equal actors shall make equal files.
+    start, end = 8, 8 + int.from_bytes(content[:8], "little")
+    header = json.dumps(json.loads(content[start:end]), sort_keys=True, separators=(",", ":"))
+    return content[:start] + header.encode().ljust(end - start) + content[end:]
 
 
 def read_actor(path: Path, scenario: Scenario) -> Actor:

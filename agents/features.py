@@ -19,7 +19,9 @@ CUT: Final = 5.0
 
 
 def features(observation: NDArray[np.float32], magnification: float) -> NDArray[np.float32]:
-    """What a network reads (..., SIZE) of observations (..., SIZE); those stay as they are."""
+    """What a network reads (..., SIZE) of observations (..., SIZE); those stay as they are, and with 1 are read so."""
+    if magnification == 1:
+        return observation
     shown = observation.copy()
     shown[..., MAGNIFIED] *= np.float32(magnification)
     return np.clip(shown, -CUT, CUT, out=shown)

@@ -4,56 +4,52 @@ import os
 import shlex
 import signal
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import Annotated, Any, Final, NoReturn
 
 import typer
 
-from baselines.registry import POLICIES, SLOW, make_policy
+from baselines.factories import classical
+from baselines.registry import FLOORS, POLICIES, SLOW
 from formation_env.envs import ENV_IDS
 from formation_env.settings import ConfigError
-
-if TYPE_CHECKING:
-    from baselines.report.flights import PolicyFactory
 
 Envs = Annotated[list[str] | None, typer.Option("--env", help="Id, scenario name or YAML file; may be repeated.")]
 Policies = Annotated[list[str] | None, typer.Option("--policy", help="Name of a policy; may be repeated.")]
 Episodes = Annotated[int, typer.Option(min=1, help="Episodes per policy and environment.")]
+SlowEpisodes = Annotated[int, typer.Option(min=1, help="Of these the first ones, for mpc, which is slow.")]
+SweepEpisodes = Annotated[int, typer.Option(min=0, help="For fronts and robustness; 0 leaves them out.")]
+BoundEpisodes = Annotated[int, typer.Option(min=0, help="Of these, for the fronts' bound; 0 is none.")]
+Fine = Annotated[bool, typer.Option("--fine", help="Fronts and robustness at more values.")]
 Out = Annotated[Path, typer.Option(file_okay=False, help="Folder to write to.")]
+Processes = Annotated[int, typer.Option(min=1, help="To fly in.")]
+Resume = Annotated[bool, typer.Option("--resume", help="Keep finished flights in OUT/flown; fly none of them again.")]
+PROCESSES: Final = min(2, os.cpu_count() or 1)
 
 
-def report(env: Envs = None, policy: Policies = None, episodes: Episodes = 100, out: Out = Path("reports")) -> None:
-    """Fly the classical policies on the same seeds, and write tables and an HTML page; mpc, which is slow, if named."""
-    names = policy or [name for name in POLICIES if name not in SLOW]
-    policies = {name: partial(make_policy, name) for name in names}
-    run_report(policies, env or list(ENV_IDS), episodes, out, "baselines")
-
-
-def run_report(
-    policies: "Mapping[str, PolicyFactory]", envs: Sequence[str], episodes: int, out: Path, package: str
+def report(
+    env: Envs = None,
+    policy: Policies = None,
+    episodes: Episodes = 100,
+    slow_episodes: SlowEpisodes = 5,
+    sweep_episodes: SweepEpisodes = 10,
+    bound_episodes: BoundEpisodes = 2,
+    fine: Fine = False,
+    resume: Resume = False,
+    out: Out = Path("reports"),
+    processes: Processes = PROCESSES,
 ) -> None:
-    """Write the report, and end the program with one line if that fails.
-
-    Args:
-        policies: label -> factory, see `baselines.report.write_report`.
-        envs: ids, names or files of scenarios.
-        episodes: seeds per environment.
-        out: folder to write to.
-        package: whose command line this is.
-
-    Raises:
-        SystemExit: 2 after a mistake in the options, 1 after another failure, 130 after an interrupt.
-    """
-    command = shlex.join(["python", "-m", package, *sys.argv[1:]])
+    """Fly the classical policies on the same seeds, and write tables and an HTML page."""
+    command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
 
     def write() -> Path:
-        from baselines.report import write_report
+        from baselines.report import Wanted, write_report
 
-        return write_report(policies, envs, episodes, out, command)
+        wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, not fine, resume)
+        return write_report(classical(policy or ()), env or list(ENV_IDS), wanted, out, command, processes)
 
-    _run("report", out, write)
+    run_report("report", out, write)
 
 
 def reproduce(
@@ -64,7 +60,7 @@ def reproduce(
     ] = 1.0,
     claims: Annotated[bool, typer.Option(help="Judge the claims, too.")] = True,
     models: Annotated[bool, typer.Option(help="Hold the linear models against the nonlinear truth, too.")] = True,
-    processes: Annotated[int, typer.Option(min=1, help="To fly in.")] = min(2, os.cpu_count() or 1),
+    processes: Processes = PROCESSES,
 ) -> None:
     """Redraw the thesis's figures, judge its claims and its models, and write all of it, with one HTML page."""
     command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
@@ -74,7 +70,7 @@ def reproduce(
 
         return write_thesis(out, Wanted(episodes, step_s, claims=claims, models=models), command, processes)
 
-    _run("reproduce", out, write)
+    run_report("reproduce", out, write)
 
 
 def sweep(
@@ -83,23 +79,25 @@ def sweep(
     policy: Policies = None,
     episodes: Annotated[int, typer.Option(min=1, help="Test seeds of each point.")] = 20,
     bound_episodes: Annotated[int, typer.Option(min=0, help="Of these, seeds of the bound's front; 0 is none.")] = 5,
+    resume: Resume = False,
     out: Out = Path("reports/sweep"),
-    processes: Annotated[int, typer.Option(min=1, help="To fly in.")] = min(2, os.cpu_count() or 1),
+    processes: Processes = PROCESSES,
 ) -> None:
     """Draw thrust against error as its price moves, and cost against noise, outages, limits and wrong models."""
     command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
     envs = [*(scenarios or ()), *(env or ())] or list(ENV_IDS)
+    names = policy or [name for name in POLICIES if name not in (*SLOW, *FLOORS)]
 
     def write() -> Path:
         from baselines.sweep.report import Wanted, write_sweep
 
-        wanted = Wanted(tuple(policy or Wanted.policies), episodes, bound_episodes)
-        return write_sweep(envs, wanted, out, command, processes)
+        wanted = Wanted(episodes, bound_episodes, resume)
+        return write_sweep(classical(names), envs, wanted, out, command, processes)
 
-    _run("sweep", out, write)
+    run_report("sweep", out, write)
 
 
-def _run(name: str, out: Path, write: Callable[[], Path]) -> None:
+def run_report(name: str, out: Path, write: Callable[[], Path]) -> None:
     """Write a report, and end the program with one line if that fails.
 
     Args:
@@ -114,7 +112,7 @@ def _run(name: str, out: Path, write: Callable[[], Path]) -> None:
     try:
         page = write()
     except KeyboardInterrupt:
-        _end(f"{name}: interrupted, nothing written", 130)
+        _end(f"{name}: interrupted, no report written", 130)
     except ModuleNotFoundError as error:
         missing = str(error.name).split(".")[0]
         extra = "optimal" if missing == "clarabel" else "report"

@@ -32,7 +32,9 @@ POLICIES: Final[dict[str, type[Any]]] = {
 }
 """Classes made with (scenario, gains), the gains being of the class's `Settings`."""
 SLOW: Final = ("mpc",)
-"""Those that solve a program at each step; the report flies them only when they are named."""
+"""Those that solve a program at each step; the report flies them on fewer seeds."""
+FLOORS: Final = ("zero", "random")
+"""Those that no policy should fall below."""
 
 
 def make_policy(
@@ -50,9 +52,7 @@ def make_policy(
     Raises:
         ConfigError: no such policy or scenario, or wrong gains; one line that names file and key.
     """
-    if name not in POLICIES:
-        raise ConfigError(f"no policy named {name!r}; {nearest(name, POLICIES)}")
-    kind = POLICIES[name]
+    kind = policy_class(name)
     if gains is None:
         gains = gains_path(scenario)
     if isinstance(gains, (str, Path)):
@@ -61,6 +61,17 @@ def make_policy(
         gains = build(kind.Settings, gains, f"gains of {name}")
     policy: AccelerationPolicy = kind(scenario_of(scenario), gains)
     return policy
+
+
+def policy_class(name: str) -> type[Any]:
+    """The class of a policy.
+
+    Raises:
+        ConfigError: there is none of that name; one line with its nearest neighbour.
+    """
+    if name not in POLICIES:
+        raise ConfigError(f"no policy named {name!r}; {nearest(name, POLICIES)}")
+    return POLICIES[name]
 
 
 def gains_path(scenario: str | Path | Scenario) -> Path:

@@ -81,14 +81,20 @@ def test_episode_statistics_are_those_of_monitor(scenario: Scenario) -> None:
     assert ended
 
 
-def test_infos_share_nothing(scenario: Scenario) -> None:
-    """A wrapper may write into a row's info; neither other rows nor later steps may see that."""
+def test_infos_are_made_for_rows_that_end_only(scenario: Scenario) -> None:
+    """No work per row: one list for all steps, in which an ended row's info stands for one step and is its own."""
     adapter = Sb3VecEnv(ROWS, scenario)
+    adapter.seed(7)
     adapter.reset()
-    first = adapter.step(actions(1)[0])[3]
-    first[0]["mark"] = 1
-    assert "mark" not in first[1]
-    assert "mark" not in adapter.step(actions(1)[0])[3][0]
+    first, told = adapter.step(actions(1)[0])[3], set()
+    for action in actions(2 * scenario.num_steps):
+        dones, infos = adapter.step(action)[2:]
+        assert infos is first
+        assert [bool(info) for info in infos] == dones.tolist()
+        ended = [id(info) for info in infos if info]
+        assert len(set(ended)) == len(ended)
+        told |= set(ended)
+    assert told
 
 
 def test_reward_scale_is_a_factor_and_leaves_the_statistics(scenario: Scenario) -> None:
@@ -176,6 +182,38 @@ def test_stable_baselines_wrappers_and_evaluation_take_the_adapter(scenario: Sce
     assert max(lengths) <= scenario.num_steps
 
 
+def test_rollouts_are_those_of_stable_baselines_own_vectorised_environment() -> None:
+    """`make_vec_env` with the same seeds is the oracle: equal to the last bit, ends, last observations and returns."""
+    rows = 3
+    plain, adapter = make_vec_env("FormationKeeping-v0", n_envs=rows, seed=4), Sb3VecEnv(rows, "FormationKeeping-v0")
+    adapter.seed(4)
+    np.testing.assert_array_equal(adapter.reset(), plain.reset())
+    noise, ends = np.random.default_rng(2), 0
+    for _ in range(2 * load_scenario("keeping").num_steps + 1):
+        action = noise.normal(0, 0.01, (rows, 3)).astype(np.float32)
+        ours, theirs = adapter.step(action), plain.step(action)
+        for one, other in zip(ours[:3], theirs[:3], strict=True):
+            np.testing.assert_array_equal(one, other)
+        for one, other in zip(ours[3], theirs[3], strict=True):
+            if "episode" in other:
+                ends += 1
+                np.testing.assert_array_equal(one["terminal_observation"], other["terminal_observation"])
+                assert one["TimeLimit.truncated"] == other["TimeLimit.truncated"]
+                assert one["episode"]["r"] == pytest.approx(other["episode"]["r"], abs=1e-6)  # Monitor rounds
+                assert one["episode"]["l"] == other["episode"]["l"]
+    assert ends == 2 * rows
+
+
+def test_an_end_that_is_one_leaves_no_value_behind(scenario: Scenario) -> None:
+    """With bootstrap_end off, SB3 must not add the value of the last observation, whatever the end."""
+    adapter = Sb3VecEnv(ROWS, scenario, bootstrap_end=False)
+    adapter.seed(7)
+    adapter.reset()
+    told = [info["TimeLimit.truncated"] for action in actions(80) for info in adapter.step(action)[3] if info]
+    assert len(told) > ROWS
+    assert not any(told)
+
+
 def test_stable_baselines_own_vectorised_environment_works() -> None:
     """The registered ids need no adapter."""
     env = make_vec_env("FormationKeeping-v0", n_envs=2, seed=0)
@@ -183,3 +221,16 @@ def test_stable_baselines_own_vectorised_environment_works() -> None:
     action, _ = model.predict(env.reset())
     assert action.shape == (2, 3)
     assert load_scenario("keeping") == env.get_attr("unwrapped")[0].scenario
+
+
+def test_rows_go_on_from_what_they_remember(scenario: Scenario) -> None:
+    """Put back in another environment, rows fly the same to the last bit, over ends and the episodes after them."""
+    one, other = Sb3VecEnv(ROWS, scenario), Sb3VecEnv(ROWS, scenario)
+    one.seed(8)
+    one.reset()
+    for action in actions(7):
+        observations = one.step(action)[0]
+    other.recall(one.memory(), observations)
+    for action in actions(50):
+        for mine, theirs in zip(one.step(action)[:3], other.step(action)[:3], strict=True):
+            np.testing.assert_array_equal(mine, theirs)

@@ -13,10 +13,13 @@ import pytest
 from typer.testing import CliRunner
 
 from baselines.__main__ import app
+from baselines.factories import Classical
 from baselines.registry import make_policy
-from baselines.sweep.flights import BOUND, COLUMNS, METRICS, Point, mean_hold_error_m
+from baselines.report import style
+from baselines.sweep.figures import front_figure, looks_of, robustness_figure
+from baselines.sweep.flights import BOUND, COLUMNS, METRICS, Point, mean_hold_error_m, points
 from baselines.sweep.report import FILES, Wanted, write_sweep
-from baselines.sweep.report_page import reading
+from baselines.sweep.report_section import expensive, reading
 from baselines.sweep.variations import FRONT, VARIATIONS, lost_share
 from formation_env import ConfigError, Scenario, load_scenario
 from formation_env.evaluation import evaluate, record
@@ -28,7 +31,8 @@ SHORT = {
     "phases": [{"formation": {"kind": "following", "y0_m": 200}, "transfer_periods": 0.1, "hold_periods": 0.1}],
 }
 COMMAND = "python -m baselines sweep short.yaml --episodes 3"
-WANTED = Wanted(policies=("lqr", "smc"), episodes=3, bound_episodes=2)
+POLICIES = {name: Classical(name) for name in ("lqr", "smc")}
+WANTED = Wanted(episodes=3, bound_episodes=2)
 TOLD = {FRONT, "sensor_noise", "thrust_limit", "initial_error"}
 CHANGES = {
     FRONT: {"reward.error_weight"},
@@ -62,7 +66,7 @@ def changed(one: Scenario, other: Scenario) -> set[str]:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("sweep") / "deep"
-    assert write_sweep([build(Scenario, SHORT, "test")], WANTED, out, COMMAND, 1) == out / "sweep.html"
+    assert write_sweep(POLICIES, [build(Scenario, SHORT, "test")], WANTED, out, COMMAND, 1) == out / "sweep.html"
     return out
 
 
@@ -92,6 +96,25 @@ def test_the_variations_hold_the_scenarios_own_value(name: str) -> None:
         assert VARIATIONS[quantity].vary(scenario, nominal)[0] == scenario
     flown, _ = VARIATIONS["ballistic_coefficient"].vary(scenario, 0.0)
     assert (flown.spacecraft, flown.leader, flown.belief) == (scenario.spacecraft, scenario.leader, scenario.belief)
+
+
+def test_a_quick_look_has_ends_and_middle() -> None:
+    """Every quantity keeps the scenario's own value and both ends, and flies no more values than before."""
+    for variation in VARIATIONS.values():
+        assert {variation.values[0], variation.values[len(variation.values) // 2]} <= set(variation.few)
+        assert variation.values[-1] == variation.few[-1]
+        assert set(variation.few) <= set(variation.values)
+    assert VARIATIONS[FRONT].few == (0.1, 0.5, 1.0, 2.0, 10.0)
+
+
+def test_the_scenario_itself_is_flown_once() -> None:
+    """Quantities whose own value leaves the scenario as it is share a point, and all of them show it."""
+    made = points({"keeping": load_scenario("keeping")}, POLICIES, (0,), 0)
+    own = [point for point in made.values() if point.flown == point.believed == point.original]
+    (point,) = own
+    assert {quantity for quantity, _ in point.places} >= TOLD | {"thrust_magnitude"}
+    places = [place for point in made.values() for place in point.places]
+    assert len(places) == len(set(places)) == sum(len(item.values) for item in VARIATIONS.values())
 
 
 def test_bursts_have_the_share_and_the_length_asked_for() -> None:
@@ -142,7 +165,7 @@ def test_all_fly_the_same_seeds_at_every_value(episodes: pd.DataFrame) -> None:
         (quantity, value, policy): [0, 1, 2]
         for quantity, variation in VARIATIONS.items()
         for value in variation.values
-        for policy in WANTED.policies
+        for policy in POLICIES
     }
     bounds: dict[tuple[str, float, str], list[int]] = {
         (FRONT, value, BOUND): [0, 1] for value in VARIATIONS[FRONT].values
@@ -155,7 +178,7 @@ def test_the_bound_is_below_every_policy_at_each_price(episodes: pd.DataFrame) -
     front = episodes[episodes["quantity"] == FRONT]
     costs = front.pivot(index=["value", "seed"], columns="policy", values="cost_m_s").dropna()
     assert len(costs) == 2 * len(VARIATIONS[FRONT].values)
-    for policy in WANTED.policies:
+    for policy in POLICIES:
         assert (costs[policy] > costs[BOUND]).all()
 
 
@@ -194,10 +217,42 @@ def test_gains_are_those_of_the_original() -> None:
     """A varied scenario equals no shipped one; it must not fall back to the default gains."""
     scenario = load_scenario("keeping")
     flown, believed = VARIATIONS["outage_length"].vary(scenario, 60.0)
-    point = Point("keeping", "outage_length", 60.0, flown, believed, scenario, ("smc",), (0,))
+    point = Point("keeping", (("outage_length", 60.0),), flown, believed, scenario, {"smc": Classical("smc")}, (0,))
     table = point.fly(lambda _: None)
     own = evaluate(make_policy("smc", "keeping"), flown, [0])
     assert table["cost_m_s"].iloc[0] == -own["return"].iloc[0]
+
+
+def drawn(figure: Any) -> dict[str, Any]:
+    """The first trace of each name."""
+    return {trace.name: trace for trace in reversed(figure.data)}
+
+
+def test_a_policy_of_one_price_is_a_dot() -> None:
+    """What flies the same at every price, as a learned policy does, has no line to follow."""
+    rows = []
+    for value in VARIATIONS[FRONT].values:
+        rows += [(FRONT, value, "lqr", value, 10 / value), (FRONT, value, "ppo", 2.0, 3.0)]
+    columns = ["quantity", "value", "policy", "delta_v_m_s", "position_error_mean_m"]
+    front = pd.DataFrame(rows, columns=columns).assign(cost_m_s=1.0)
+    traces = drawn(front_figure(front, looks_of(["lqr", "ppo"]), ()))
+    assert (traces["lqr"].mode, traces["ppo"].mode) == ("lines+markers", "markers")
+    assert traces["ppo"].marker.color not in [look.color for look in style.looks(["lqr", "smc"]).values()]
+
+
+def test_what_would_squash_the_others_starts_hidden(folder: Path) -> None:
+    """Four times the cost at most points: hidden in both pictures, and the axes fit the rest."""
+    data = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
+    summary = pd.DataFrame(data["summary"])
+    lqr = summary[summary["policy"] == "lqr"]
+    measured = ["cost_m_s", "cost_low_m_s", "cost_high_m_s", "delta_v_m_s", "position_error_mean_m"]
+    dear = lqr.assign(policy="dear", **{name: 4 * lqr[name] for name in measured})
+    both = pd.concat([lqr, dear])
+    assert expensive(both) == ["dear"]
+    for draw in (front_figure, robustness_figure):
+        figure, alone = (draw(table, looks_of(["lqr", "dear"]), ["dear"]) for table in (both, lqr))
+        assert (drawn(figure)["dear"].visible, drawn(figure)["lqr"].visible in (None, True)) == ("legendonly", True)
+        assert figure.layout.yaxis.range == alone.layout.yaxis.range
 
 
 def test_files_are_complete(folder: Path, episodes: pd.DataFrame) -> None:
@@ -263,7 +318,7 @@ def test_what_does_not_fit_is_named(tmp_path: Path) -> None:
     """A step longer than the shortest outage, and an error without a price, by environment, key and value."""
     slow = build(Scenario, SHORT | {"dt_s": 90.0}, "test")
     with pytest.raises(ConfigError, match=r"outage_length = 60: dropout\.mean_outage_s: a mean of 60 s is shorter"):
-        write_sweep([slow], WANTED, tmp_path, COMMAND, 1)
+        write_sweep(POLICIES, [slow], WANTED, tmp_path, COMMAND, 1)
     free = build(Scenario, SHORT | {"reward": {"error_weight": 0.0}}, "test")
     with pytest.raises(ConfigError, match=r"reward\.error_weight: must be > 0 for a front, got 0"):
-        write_sweep([free], WANTED, tmp_path, COMMAND, 1)
+        write_sweep(POLICIES, [free], WANTED, tmp_path, COMMAND, 1)

@@ -15,10 +15,15 @@ from typer.testing import CliRunner
 
 from baselines.__main__ import app
 from baselines.floors import Random, RandomSettings, Zero, ZeroSettings
-from baselines.report import FILES, style, write_report
+from baselines.registry import POLICIES as CLASSICAL
+from baselines.report import FILES, Wanted, style, write_report
 from baselines.report.flight_figures import outage_path
-from baselines.report.results import numbers, significant
+from baselines.report.flights import Flown
+from baselines.report.results import analyse, significant
 from baselines.report.scales import Scale, round_values
+from baselines.report.words import numbers
+from baselines.sweep.flights import BOUND
+from baselines.sweep.variations import FRONT, VARIATIONS
 from formation_env import ConfigError, Scenario, load_scenario
 from formation_env.files import write_texts
 from formation_env.metrics import METRICS
@@ -36,19 +41,21 @@ SHORT = {
 }
 
 
-def zero(scenario: Scenario) -> Zero:
-    return Zero(scenario, ZeroSettings())
+def zero(original: Scenario, believed: Scenario) -> Zero:
+    return Zero(believed, ZeroSettings())
 
 
-def random(scenario: Scenario) -> Random:
-    return Random(scenario, RandomSettings())
+def random(original: Scenario, believed: Scenario) -> Random:
+    return Random(believed, RandomSettings())
 
 
-def only_short(scenario: Scenario) -> Zero | None:
-    return zero(scenario) if len(scenario.phases) == 2 else None
+def only_short(original: Scenario, believed: Scenario) -> Zero | None:
+    return zero(original, original) if len(original.phases) == 2 else None
 
 
 POLICIES = {"zero": zero, "random": random, "learned_one": only_short}
+FEW = 2
+WANTED = Wanted(EPISODES, FEW, sweep_episodes=2, sweep_bound_episodes=1, slow=("random",), unswept=("random",))
 
 
 def short_scenarios() -> list[Scenario]:
@@ -59,7 +66,7 @@ def short_scenarios() -> list[Scenario]:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report") / "deep" / "folder"
-    assert write_report(POLICIES, short_scenarios(), EPISODES, out, COMMAND) == out / "report.html"
+    assert write_report(POLICIES, short_scenarios(), WANTED, out, COMMAND) == out / "report.html"
     return out
 
 
@@ -76,31 +83,65 @@ def test_policies_are_held_against_the_bound(folder: Path) -> None:
     for env, found in data["environments"].items():
         assert len(found["bounds"]) == EPISODES
         for policy, line in found["policies"].items():
-            ratios = -episodes.loc[(env, policy), "return"].to_numpy() / np.array(found["bounds"])
+            costs = -episodes.loc[(env, policy), "return"].to_numpy()
+            ratios = costs / np.array(found["bounds"])[: len(costs)]
             assert line["regret"]["mean"] == pytest.approx(ratios.mean(), rel=1e-9)
             assert (ratios > 1).all()
     assert "over bound" in (folder / "report.html").read_text(encoding="utf-8")
 
 
 def test_one_line_per_environment_policy_and_seed(folder: Path) -> None:
-    """The same seeds for all policies; a policy that has none for a scenario is left out there."""
+    """The same seeds for all, the first of them for slow policies; who has none for a scenario is left out there."""
     table = pd.read_csv(folder / "episodes.csv")
     assert list(table.columns) == ["env", "policy", "seed", *METRICS]
     flown = table.groupby(["env", "policy"])["seed"].apply(list).to_dict()
     titles = [scenario.title for scenario in short_scenarios()]
     expected = {(title, name) for title in titles for name in ("zero", "random")} | {(titles[0], "learned_one")}
     assert set(flown) == expected
-    assert all(seeds == list(range(EPISODES)) for seeds in flown.values())
+    assert all(seeds == list(range(FEW if name == "random" else EPISODES)) for (_, name), seeds in flown.items())
 
 
 def test_means_are_those_of_the_episodes(folder: Path) -> None:
     """summary.csv against pandas over episodes.csv; they differ by the rounding of sums only."""
     episodes = pd.read_csv(folder / "episodes.csv")
     summary = pd.read_csv(folder / "summary.csv").set_index(["env", "policy", "metric"])
-    means = episodes.groupby(["env", "policy"])[list(METRICS)].mean().stack()
+    means = episodes[episodes["policy"] != "random"].groupby(["env", "policy"])[list(METRICS)].mean().stack()
     np.testing.assert_allclose(summary.loc[means.index, "mean"], means, rtol=1e-12)
     assert (summary["low"] <= summary["mean"] + 1e-12).all()
     assert (summary["mean"] <= summary["high"] + 1e-12).all()
+
+
+def test_means_of_fewer_seeds_are_estimates_for_all(folder: Path) -> None:
+    """By hand: what all seeds gave the policy that flew them, and the mean difference to it on the first ones."""
+    episodes = pd.read_csv(folder / "episodes.csv").set_index(["env", "policy", "seed"]).sort_index()
+    summary = pd.read_csv(folder / "summary.csv").set_index(["env", "policy", "metric"]).sort_index()
+    for env in episodes.index.unique("env"):
+        zero, few = episodes.loc[env, "zero"], episodes.loc[env, "random"]
+        expected = zero.mean() + (few - zero.loc[: FEW - 1]).mean()
+        for metric in METRICS:
+            line = summary.loc[env, "random", metric]
+            assert line["mean"] == pytest.approx(expected[metric], rel=1e-9, abs=1e-9)
+            assert line["low"] <= line["mean"] <= line["high"]
+            assert line["episodes"] == FEW
+
+
+def test_easy_seeds_do_not_win() -> None:
+    """A slow policy that flew the easy half and costs 1 m/s more on each seed is not ranked first."""
+
+    def table(costs: list[float]) -> pd.DataFrame:
+        values = dict.fromkeys(METRICS, 1.0) | {"seed": range(len(costs)), "return": [-cost for cost in costs]}
+        return pd.DataFrame(values, index=range(len(costs)))
+
+    full, slow = [1.0, 1.1, 5.0, 5.1], [2.0, 2.1]
+    flown = Flown("env", short_scenarios()[0], {"slow": table(slow), "full": table(full)}, 0, {}, {})
+    (results,) = analyse([flown], {"env": np.full(4, 0.5)})
+    assert (results.ranking, results.reference, results.partial) == (["full", "slow"], "full", ["slow"])
+    assert results.cost("slow")[0] == pytest.approx(np.mean(full) + 1)
+    assert results.behind("full", "slow") == pytest.approx((1, 1, 1))
+    assert results.regrets["slow"][0] == pytest.approx(np.mean(slow) / 0.5)
+    low, high = results.cost("slow")[1:]
+    # the difference is the same everywhere, so all that is uncertain is the reference's mean
+    assert (low, high) == pytest.approx(tuple(end + 1 for end in results.cost("full")[1:]))
 
 
 def test_json_is_complete(folder: Path) -> None:
@@ -118,6 +159,9 @@ def test_json_is_complete(folder: Path) -> None:
         assert _rebuilt(environment["scenario"]) == scenario
         for name, policy in environment["policies"].items():
             assert set(policy["summary"]) == set(METRICS)
+            assert policy["episodes"] == (FEW if name == "random" else EPISODES)
+            assert policy["action_time_us"] > 0
+            assert policy["cost_m_s"]["mean"] == -policy["summary"]["return"]["mean"]
             best = environment["ranking"][0]
             assert name == best or set(policy["paired_differences"][best]["return"]) == {"mean", "low", "high"}
 
@@ -138,22 +182,58 @@ def test_page_holds_everything_and_loads_nothing(folder: Path) -> None:
     assert all(name in own for name in POLICIES)
     assert not re.search(r"https?://|<link|<iframe|@import|url\(|\bsrc\s*=", own)
     assert "default-src 'none'" in own
-    assert own.count("Plotly.newPlot") == 4 * len(short_scenarios())
+    assert own.count("Plotly.newPlot") == 6 * len(short_scenarios())
     assert len(page) < 8e6
 
 
+def test_the_page_says_who_wins_and_who_flew_less(folder: Path) -> None:
+    """A sentence per environment at the top, with the numbers of the data; why some flew fewer seeds."""
+    page = (folder / "report.html").read_text(encoding="utf-8").replace(get_plotlyjs(), "")
+    data = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    top = page[: page.index("Mean cost in m/s")]
+    for found in data["environments"].values():
+        best = found["ranking"][0]
+        cost, over = (found["policies"][best][key] for key in ("cost_m_s", "regret"))
+        mean, (ratio, low, high) = numbers(tuple(cost.values()))[0], numbers(tuple(over.values()))
+        assert f"{best} wins at {mean} m/s, {ratio} [{low}, {high}] times" in top
+        assert f"next is {found['ranking'][1]}, " in top
+    assert page.count("Too slow for all 3 seeds: random (2) flew the first ones only") == len(data["environments"])
+
+
+def test_fronts_and_robustness_are_in_the_report(folder: Path) -> None:
+    """Every point of a sweep is flown by all policies but the left out, on the first test seeds."""
+    lines = pd.read_csv(folder / "sweep.csv")
+    flown = lines.groupby(["env", "quantity", "value", "policy"])["seed"].apply(list)
+    for scenario in short_scenarios():
+        crew = {"zero", "learned_one"} if len(scenario.phases) == 2 else {"zero"}
+        for quantity, variation in VARIATIONS.items():
+            for value in variation.few:
+                found = flown.loc[scenario.title, quantity, value].to_dict()
+                expected = {name: [0, 1] for name in crew} | ({BOUND: [0]} if quantity == FRONT else {})
+                assert found == expected
+
+
+def test_no_front_where_none_is_possible(tmp_path: Path) -> None:
+    """An error without a price has no front; the report says so, and is written all the same."""
+    free = build(Scenario, SHORT | {"reward": {"error_weight": 0.0}}, "test")
+    page = write_report({"random": random}, [free], Wanted(2, unswept=()), tmp_path, COMMAND)
+    assert "No front and no robustness: sweep: " in page.read_text(encoding="utf-8")
+    assert "must be &gt; 0 for a front, got 0" in page.read_text(encoding="utf-8")
+    assert len(pd.read_csv(tmp_path / "sweep.csv")) == 0
+
+
 def test_a_failure_leaves_the_old_files(folder: Path, tmp_path: Path) -> None:
-    """A policy that fails in mid-flight: no file changes, none appears."""
+    """A policy that fails in mid-flight: no file changes, none appears but the bounds, which are as good as new."""
 
     class Failing(Zero):
         def predict(self, observation, state=None, episode_start=None, deterministic=True):  # type: ignore[no-untyped-def]
             raise RuntimeError("in mid-flight")
 
     (tmp_path / "report.html").write_text("old")
-    policies = {"zero": zero, "failing": lambda scenario: Failing(scenario, ZeroSettings())}
+    policies = {"zero": zero, "failing": lambda original, believed: Failing(believed, ZeroSettings())}
     with pytest.raises(RuntimeError, match="in mid-flight"):
-        write_report(policies, short_scenarios(), EPISODES, tmp_path, COMMAND)
-    assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+        write_report(policies, short_scenarios(), WANTED, tmp_path, COMMAND)
+    assert {path.name for path in tmp_path.iterdir()} <= {"report.html", "bounds"}
     assert (tmp_path / "report.html").read_text() == "old"
 
 
@@ -182,20 +262,22 @@ def test_files_are_written_all_or_none(tmp_path: Path, monkeypatch: pytest.Monke
 def test_wrong_environments_are_named(tmp_path: Path, envs: list[str], message: str) -> None:
     """A mistake in the command is found before anything flies."""
     with pytest.raises(ConfigError, match=message):
-        write_report(POLICIES, envs, EPISODES, tmp_path / "out", COMMAND)
+        write_report(POLICIES, envs, WANTED, tmp_path / "out", COMMAND)
     assert not (tmp_path / "out").exists()
 
 
 def test_an_environment_without_policy_is_refused(tmp_path: Path) -> None:
     """A report without a line says nothing."""
-    with pytest.raises(ConfigError, match="no policy for keeping"):
-        write_report({"none": lambda scenario: None}, ["keeping"], EPISODES, tmp_path, COMMAND)
+    with pytest.raises(ConfigError, match="no policy for keeping_nonlinear"):
+        write_report({"none": lambda original, believed: None}, ["keeping_nonlinear"], WANTED, tmp_path, COMMAND)
+    assert not list(tmp_path.iterdir())
 
 
 def test_ctrl_c_ends_in_one_line_and_leaves_nothing(tmp_path: Path) -> None:
     """SIGINT during the flights of the real command: non-zero exit, one line after the progress bar, no file."""
     out = tmp_path / "out"
-    arguments = ["report", "--episodes", "20000", "--env", "mission", "--policy", "zero", "--out", str(out)]
+    arguments = ["report", "--episodes", "20000", "--env", "keeping_nonlinear", "--policy", "zero"]
+    arguments += ["--processes", "1", "--out", str(out)]
     process = subprocess.Popen([sys.executable, "-m", "baselines", *arguments], stderr=subprocess.PIPE, text=True)
     assert process.stderr is not None
     shown = ""
@@ -205,7 +287,7 @@ def test_ctrl_c_ends_in_one_line_and_leaves_nothing(tmp_path: Path) -> None:
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert errors.endswith("\nreport: interrupted, nothing written\n")
+    assert errors.endswith("\nreport: interrupted, no report written\n")
     assert "Traceback" not in errors
     assert not out.exists()
 
@@ -242,10 +324,13 @@ def test_outages_are_the_instants_without_measurement() -> None:
 
 
 def test_a_policy_looks_the_same_whoever_else_flies() -> None:
-    """The classical policies keep their colours; learned ones get others."""
-    alone, together = style.looks(["smc"]), style.looks(["ppo", "lqr", "smc", "sac"])
-    assert alone["smc"].color == together["smc"].color
-    assert len({look.color for look in together.values()}) == 4
+    """The classical policies keep their looks; learned ones get colours that none of them has."""
+    alone, together = style.looks(["smc"]), style.looks(["ppo", *CLASSICAL, "sac", "td3"])
+    assert alone["smc"] == together["smc"]
+    classical, learned = ([together[name] for name in names] for names in (CLASSICAL, ("ppo", "sac", "td3")))
+    assert not {look.color for look in classical} & {look.color for look in learned}
+    assert len({look.symbol for look in together.values()}) == len(together)
+    assert len({(look.color, look.dash) for look in together.values()}) == len(together)
 
 
 def test_numbers_show_their_interval() -> None:

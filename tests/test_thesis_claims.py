@@ -6,12 +6,14 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from baselines.thesis import claims, claims_grid, jobs, plan, scenarios
+from baselines import jobs
+from baselines.thesis import claims, claims_grid, plan, scenarios
 from baselines.thesis.claims_conclusions import least_fuel_m_s
 from baselines.thesis.claims_fair import LAWS, candidates
 from baselines.thesis.claims_flights import Effort, Noise
 from baselines.thesis.claims_readings import READINGS
 from baselines.thesis.claims_verdict import Between, Statement
+from baselines.thesis.jobs import Job
 from formation_env.scenario import load_scenario
 
 TINY = Effort(seeds=2, dt_s=60.0, periods=2, coarse_dt_s=60.0, grid_dt_s=60.0, truths=("modified_hcw",), candidates=2)
@@ -88,7 +90,7 @@ def test_the_misprinted_frequency_gives_the_thesis_s_300_m() -> None:
     0.5 %.
     """
     scenario = replace(plan.printed(QUIET.on(scenarios.keeping(1.0))))
-    flights = jobs.Job(scenario, (plan.LQR,), (0,), every=100).fly(lambda cost: None)
+    flights = Job(scenario, (plan.LQR,), (0,), every=100).fly(lambda cost: None)
     n, k, r = 1.08308e-3, 1.42216e-3, 12000 / 1.08308e-3**2
     z_m = math.hypot(2000 * math.sqrt(3), 0.2 * math.sqrt(3) / n)
     K1 = math.sqrt(k**4 + 1 / r) - k**2

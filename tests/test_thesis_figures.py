@@ -15,9 +15,10 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
+from baselines import jobs
 from baselines.__main__ import app
 from baselines.registry import make_policy
-from baselines.thesis import claims, jobs, plan, report, scenarios, tables
+from baselines.thesis import claims, plan, report, scenarios, tables
 from baselines.thesis.claim import Claim
 from baselines.thesis.figures import FIGURES, drawings, orbits, style
 from baselines.thesis.flights import Flights, desired_path, fly
@@ -348,6 +349,6 @@ def test_ctrl_c_ends_all_processes_in_one_line(tmp_path: Path) -> None:
         process.send_signal(signal.SIGTERM)
         rest = process.stderr.read()
     assert process.returncode == 130
-    assert rest.endswith("reproduce: interrupted, nothing written\n")
+    assert rest.endswith("reproduce: interrupted, no report written\n")
     assert "Traceback" not in rest
     assert not out.exists()

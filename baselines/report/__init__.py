@@ -3,7 +3,7 @@
 `write_report` takes any policies by name, so learned ones stand beside the classical ones.
 """
 
-from baselines.report.flights import Flown, PolicyFactory
+from baselines.report.wanted import Wanted
 from baselines.report.write import FILES, write_report
 
-__all__ = ["FILES", "Flown", "PolicyFactory", "write_report"]
+__all__ = ["FILES", "Wanted", "write_report"]

@@ -3,7 +3,6 @@
 import json
 import math
 import platform
-from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
@@ -13,6 +12,9 @@ import numpy as np
 
 import formation_env
 from baselines.report.results import Interval, Results
+from baselines.report.wanted import Wanted
+from baselines.sweep.flights import Sweep
+from formation_env.seeds import seeds
 
 LIBRARIES = (
     "numpy",
@@ -40,15 +42,18 @@ def versions() -> dict[str, str]:
     return found
 
 
-def document(results: list[Results], seeds: Sequence[int], command: str) -> dict[str, Any]:
+def document(results: list[Results], sweep: Sweep, wanted: Wanted, command: str) -> dict[str, Any]:
     """All that is needed to redo and to judge the report, as plain data."""
     return {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": command,
         "versions": versions(),
-        "seeds": [int(seed) for seed in seeds],
+        "seeds": list(seeds("test", wanted.episodes)),
+        "wanted": asdict(wanted),
+        "means": "over all seeds; of policies with fewer episodes the reference's plus the paired difference to it",
         "intervals": "bootstrap, 95 %, of the mean",
         "environments": {item.flown.label: _environment(item) for item in results},
+        "sweep": sweep.as_data(),
     }
 
 
@@ -59,6 +64,7 @@ def _environment(results: Results) -> dict[str, Any]:
         "num_steps": flown.scenario.num_steps,
         "flight_seed": flown.flight_seed,
         "ranking": results.ranking,
+        "reference": results.reference,
         "bounds": results.bounds,
         "policies": {name: _policy(results, name) for name in flown.episodes},
     }
@@ -68,7 +74,10 @@ def _policy(results: Results, name: str) -> dict[str, Any]:
     summary = results.summaries[name]
     return {
         "settings": results.flown.settings.get(name),
+        "episodes": results.count(name),
         "ended_early": results.ended_early(name),
+        "action_time_us": results.flown.action_time_us(name),
+        "cost_m_s": _interval(results.cost(name)),
         "regret": _interval(results.regrets[name]) if name in results.regrets else None,
         "summary": {str(metric): _interval(results.interval(name, str(metric))) for metric in summary.index},
         "paired_differences": {

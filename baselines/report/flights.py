@@ -1,19 +1,18 @@
 """What the report is about: every policy flown on every environment with the same seeds."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, is_dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from tqdm import tqdm
 
-from formation_env.evaluation import Policy, evaluate, record, scenario_of
+from baselines.factories import describe
+from baselines.report.work import ACTION_TIME, Episodes, Flight
+from formation_env.evaluation import scenario_of
 from formation_env.scenario import Scenario
 from formation_env.settings import ConfigError
 
-PolicyFactory = Callable[[Scenario], Policy | None]
-"""Makes a fresh policy for a scenario, or None if it has none for it."""
 Environment = str | Path | Scenario
 """A registered id, a scenario's name or path, or a Scenario."""
 
@@ -25,9 +24,10 @@ class Flown:
     Attributes:
         label: name of the environment in the report.
         scenario: its settings.
-        episodes: policy -> table of `formation_env.evaluation.evaluate`.
+        episodes: policy -> table of `formation_env.evaluation.evaluate`; shorter tables have the first ones of the
+            longest's seeds.
         flight_seed: seed of the flights shown in full.
-        flights: policy -> table of `formation_env.evaluation.record`.
+        flights: policy -> table of `formation_env.evaluation.record`, with the column `ACTION_TIME`.
         settings: policy -> its own settings as plain data, where it tells them.
     """
 
@@ -37,6 +37,10 @@ class Flown:
     flight_seed: int
     flights: dict[str, pd.DataFrame]
     settings: dict[str, Any]
+
+    def action_time_us(self, policy: str) -> float:
+        """Median time of one action in the flight that is shown, microseconds."""
+        return float(self.flights[policy][ACTION_TIME].median())
 
 
 def name_environments(envs: Sequence[Environment]) -> dict[str, Scenario]:
@@ -58,62 +62,50 @@ def name_environments(envs: Sequence[Environment]) -> dict[str, Scenario]:
     return named
 
 
-def fly(policies: Mapping[str, PolicyFactory], envs: Sequence[Environment], seeds: Sequence[int]) -> list[Flown]:
-    """Fly all policies on all environments, with a progress bar.
+def join_episodes(
+    jobs: Mapping[tuple[str, str, int], Episodes], found: Mapping[Any, pd.DataFrame | None]
+) -> dict[str, dict[str, pd.DataFrame]]:
+    """Environment -> policy -> its episodes, in the order of their seeds.
 
     Args:
-        policies: label -> factory.
-        envs: what to fly.
-        seeds: one episode each, the same for all.
+        jobs: what was flown.
+        found: their tables by the same names.
 
     Raises:
-        ConfigError: a faulty environment or policy, or an environment without any policy.
+        ConfigError: an environment without any policy.
     """
-    named = name_environments(envs)
-    crews = {label: _crew(policies, label, scenario) for label, scenario in named.items()}
-    total = sum(named[label].num_steps * (len(seeds) + 1) * len(crew) for label, crew in crews.items())
-    first = "flying (the very first run compiles the kernel)"
-    with tqdm(total=total, desc=first, unit="step", unit_scale=True, smoothing=0.1, dynamic_ncols=True) as bar:
-        return [_fly_one(label, named[label], crew, seeds, bar) for label, crew in crews.items()]
+    parts: dict[str, dict[str, list[pd.DataFrame]]] = {env: {} for env, _, _ in jobs}
+    for env, policy, first in jobs:
+        table = found[env, policy, first]
+        if table is not None:
+            parts[env].setdefault(policy, []).append(table)
+    for env, policies in parts.items():
+        if not policies:
+            raise ConfigError(f"report: no policy for {env}")
+    return {
+        env: {policy: pd.concat(tables, ignore_index=True) for policy, tables in policies.items()}
+        for env, policies in parts.items()
+    }
 
 
-def _crew(policies: Mapping[str, PolicyFactory], label: str, scenario: Scenario) -> dict[str, Policy]:
-    """The policies that fly a scenario."""
-    made = {name: factory(scenario) for name, factory in policies.items()}
-    crew = {name: policy for name, policy in made.items() if policy is not None}
-    if not crew:
-        raise ConfigError(f"report: no policy for {label}")
-    return crew
+def flight_jobs(
+    jobs: Mapping[tuple[str, str, int], Episodes], episodes: Mapping[str, Mapping[str, pd.DataFrame]]
+) -> dict[tuple[str, str], Flight]:
+    """One flight of each policy on a typical seed of its environment, by environment and policy.
+
+    Args:
+        jobs: what was flown.
+        episodes: what came of it, see `join_episodes`.
+    """
+    seeds = {env: typical_seed(tables) for env, tables in episodes.items()}
+    return {
+        (env, policy): Flight(job.scenario, policy, job.factory, seeds[env], job.slow)
+        for (env, policy, _), job in jobs.items()
+        if policy in episodes[env]
+    }
 
 
-def _fly_one(
-    label: str,
-    scenario: Scenario,
-    crew: Mapping[str, Policy],
-    seeds: Sequence[int],
-    bar: "tqdm[Any]",
-) -> Flown:
-    """All episodes of an environment, then one flight of each policy on a typical seed."""
-    episodes = {}
-    for name, policy in crew.items():
-        flown_before, expected = bar.n, scenario.num_steps * len(seeds)
-        episodes[name] = evaluate(policy, scenario, seeds, lambda n, name=name: _advance(bar, f"{label}: {name}", n))
-        bar.update(flown_before + expected - bar.n)  # episodes that ended early
-    seed = _typical_seed(episodes)
-    flights = {}
-    for name, policy in crew.items():
-        flights[name] = record(policy, scenario, seed)
-        bar.update(scenario.num_steps)
-    settings = {name: described for name, policy in crew.items() if (described := describe(policy)) is not None}
-    return Flown(label, scenario, episodes, seed, flights, settings)
-
-
-def _advance(bar: "tqdm[Any]", text: str, steps: int) -> None:
-    bar.set_description(text, refresh=False)
-    bar.update(steps)
-
-
-def _typical_seed(episodes: Mapping[str, pd.DataFrame]) -> int:
+def typical_seed(episodes: Mapping[str, pd.DataFrame]) -> int:
     """A seed of the middle fifth of the best policy's returns: the one that lost nearest to the mean share of data."""
     best = max(episodes.values(), key=lambda table: table["return"].mean()).sort_values("return")
     middle = best.iloc[2 * len(best) // 5 : 3 * len(best) // 5 + 1]
@@ -121,7 +113,26 @@ def _typical_seed(episodes: Mapping[str, pd.DataFrame]) -> int:
     return int(middle["seed"].loc[far.idxmin()])
 
 
-def describe(policy: Policy) -> Any:
-    """A policy's settings as plain data: its attribute `gains`, if that is a settings object."""
-    gains = getattr(policy, "gains", None)
-    return asdict(gains) if is_dataclass(gains) and not isinstance(gains, type) else None
+def join_flights(
+    scenarios: Mapping[str, Scenario],
+    episodes: Mapping[str, dict[str, pd.DataFrame]],
+    jobs: Mapping[tuple[str, str], Flight],
+    found: Mapping[Any, pd.DataFrame],
+) -> list[Flown]:
+    """All that is known of each environment.
+
+    Args:
+        scenarios: by environment.
+        episodes: by environment and policy.
+        jobs: the flights that were flown.
+        found: their tables by the same names.
+    """
+    result = []
+    for env, scenario in scenarios.items():
+        own = {policy: job for (place, policy), job in jobs.items() if place == env}
+        flights = {policy: found[env, policy] for policy in own}
+        told = {policy: describe(job.factory, scenario) for policy, job in own.items()}
+        settings = {policy: values for policy, values in told.items() if values is not None}
+        seed = next(iter(own.values())).seed
+        result.append(Flown(env, scenario, episodes[env], seed, flights, settings))
+    return result

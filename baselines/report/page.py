@@ -2,22 +2,20 @@
 
 from typing import Any
 
-import jinja2
-import plotly.io
-from markupsafe import Markup
-from plotly.graph_objects import Figure
-from plotly.offline import get_plotlyjs
-
-from baselines.report import style
+from baselines.report import html
 from baselines.report.flight_figures import time_figure
-from baselines.report.results import Results, number, numbers, reading, significant
+from baselines.report.results import Results, significant
 from baselines.report.scene_figure import scene_figure
 from baselines.report.score_figures import Looks, cost_figure, trade_figure
+from baselines.report.words import duration, fewer, headline, number, numbers, reading
+from baselines.sweep.figures import looks_of
+from baselines.sweep.flights import Sweep
+from baselines.sweep.report_section import section
 from formation_env.metrics import METRICS
 
 # Metric: heading, unit, factor.
 COLUMNS: dict[str, tuple[str, str, float]] = {
-    "return": ("return", "m/s", 1.0),
+    "return": ("cost", "m/s", -1.0),
     "delta_v_m_s": ("Δv", "m/s", 1.0),
     "position_error_mean_m": ("mean error", "m", 1.0),
     "position_error_rms_m": ("rms error", "m", 1.0),
@@ -30,43 +28,37 @@ COLUMNS: dict[str, tuple[str, str, float]] = {
 _NEVER_BEST = ("measurements_lost",)
 
 
-def render(results: list[Results], data: dict[str, Any]) -> str:
-    """The page of all environments.
+def render(results: list[Results], sweep: Sweep, data: dict[str, Any]) -> str:
+    """The page of all environments: one file that needs no network.
 
     Args:
         results: what to show.
+        sweep: fronts and robustness.
         data: the report as data (`baselines.report.document`).
     """
     policies = list(dict.fromkeys(name for item in results for name in item.flown.episodes))
-    looks = style.looks(policies)
-    loader = jinja2.PackageLoader("baselines.report")
-    environment = jinja2.Environment(
-        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    looks = looks_of(policies)
+    return html.render(
+        "page.html.jinja",
+        {
+            "data": data,
+            "policies": policies,
+            "colors": {name: look.color for name, look in looks.items()},
+            "overview": [_overview(item, policies) for item in results],
+            "sections": [_section(index, item, sweep, looks, data) for index, item in enumerate(results)],
+        },
     )
-    return environment.get_template("page.html.jinja").render(
-        data=data,
-        policies=policies,
-        colors={name: look.color for name, look in looks.items()},
-        overview=[_overview(item, policies) for item in results],
-        sections=[_section(index, item, looks, data) for index, item in enumerate(results)],
-        plotly_js=Markup(get_plotlyjs()),
-        css=Markup(_css(loader, environment)),
-    )
-
-
-def _css(loader: jinja2.PackageLoader, environment: jinja2.Environment) -> str:
-    return loader.get_source(environment, "page.css")[0]
 
 
 def _overview(results: Results, policies: list[str]) -> dict[str, Any]:
     """A line of the first table: mean cost of each policy on one environment."""
-    costs = {name: numbers(results.interval(name, "return"), -1)[0] for name in results.flown.episodes}
+    costs = {name: numbers(results.cost(name))[0] for name in results.flown.episodes}
     bound = "–" if results.bounds is None else number(float(results.bounds.mean()))
     line = {"label": results.flown.label, "best": results.best, "bound": bound}
     return line | {"costs": [(name, costs.get(name)) for name in policies]}
 
 
-def _section(index: int, results: Results, looks: Looks, data: dict[str, Any]) -> dict[str, Any]:
+def _section(index: int, results: Results, sweep: Sweep, looks: Looks, data: dict[str, Any]) -> dict[str, Any]:
     """All that the template shows of one environment."""
     flown = results.flown
     details = data["environments"][flown.label]
@@ -81,12 +73,14 @@ def _section(index: int, results: Results, looks: Looks, data: dict[str, Any]) -
         "label": flown.label,
         "title": flown.scenario.title,
         "facts": _facts(results),
+        "headline": headline(results),
         "reading": reading(results),
+        "fewer": fewer(results),
         "columns": _columns(),
         "rows": [_row(results, name) for name in results.ranking],
         "versus": results.best,
         "bound": None if results.bounds is None else number(float(results.bounds.mean())),
-        "figures": {key: div(figure, f"{key}-{index}") for key, figure in figures.items()},
+        "figures": {key: html.div(figure, f"{key}-{index}") for key, figure in figures.items()},
         "zero_thrust": any((table["delta_v_m_s"] <= 0).any() for table in flown.episodes.values()),
         "hidden": results.hidden,
         "flight_seed": flown.flight_seed,
@@ -94,6 +88,8 @@ def _section(index: int, results: Results, looks: Looks, data: dict[str, Any]) -
         "tolerance_m": flown.scenario.tolerance_m,
         "weight": flown.scenario.reward.error_weight,
         "details": details,
+        "sweep": section(index, flown.scenario, sweep.of(flown.label), looks),
+        "unswept": sweep.faults.get(flown.label),
     }
 
 
@@ -121,7 +117,8 @@ def _row(results: Results, name: str) -> dict[str, Any]:
     cells = []
     for metric, _, _ in _columns():
         factor = COLUMNS.get(metric, ("", "", 1.0))[2]
-        mean, low, high = numbers(results.interval(name, metric), factor)
+        mean, *ends = numbers(results.interval(name, metric), factor)
+        low, high = ends if factor > 0 else ends[::-1]
         best = metric not in _NEVER_BEST and name in results.best_of(metric)
         cells.append({"mean": mean, "low": low, "high": high, "best": best})
     ratio = numbers(results.regrets[name]) if results.regrets else None
@@ -130,15 +127,17 @@ def _row(results: Results, name: str) -> dict[str, Any]:
         "best": name == results.best,
         "cells": cells,
         "versus": _versus(results, name),
+        "episodes": results.count(name),
+        "action_time": duration(results.flown.action_time_us(name)),
         "regret": ratio and dict(zip(("mean", "low", "high"), ratio, strict=True)),
     }
 
 
 def _versus(results: Results, name: str) -> dict[str, Any] | None:
-    """The paired difference of the return to the best policy's."""
+    """The paired difference of the cost to the best policy's."""
     if name == results.best:
         return None
-    difference = results.differences[results.best][name]["return"]
+    difference = results.behind(results.best, name)
     mean, low, high = numbers(difference)
     return {"mean": mean, "low": low, "high": high, "significant": significant(difference)}
 
@@ -151,10 +150,3 @@ def _flight(results: Results, name: str) -> dict[str, str]:
         "delta_v": number(float(flight["delta_v_m_s"].sum())),
         "final": number(float(flight["position_error_m"].iloc[-1])),
     }
-
-
-def div(figure: Figure, name: str) -> Markup:
-    """A figure as an HTML element with its data; plotly.js stands once in the page's head."""
-    config = {"responsive": True, "displaylogo": False, "modeBarButtonsToRemove": ["select2d", "lasso2d"]}
-    html = plotly.io.to_html(figure, full_html=False, include_plotlyjs=False, div_id=name, config=config)
-    return Markup(html)

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
 import pandas as pd
 from tqdm import tqdm
 
@@ -32,14 +31,17 @@ class Results:
     Attributes:
         flown: the flights.
         ranking: policies, best mean return first.
-        summaries: policy -> table of `formation_env.evaluation.summarise`.
-        differences: compared-with policy -> policy -> metric -> mean difference and interval, on the same seeds.
+        reference: the best of the policies that flew all seeds.
+        summaries: policy -> table of `formation_env.evaluation.summarise`; of a policy that flew fewer seeds estimates
+            over all of them, see `estimate`.
+        differences: compared-with policy -> policy -> metric -> mean difference and interval, on the seeds of both.
         bounds: least cost that was possible on each seed (seeds,), m/s; None where it is not known.
-        regrets: policy -> mean cost over bound and its interval; empty without bounds.
+        regrets: policy -> mean cost over bound and its interval on its own seeds; empty without bounds above 0.
     """
 
     flown: Flown
     ranking: list[str]
+    reference: str
     summaries: dict[str, pd.DataFrame]
     differences: dict[str, dict[str, dict[str, Interval]]]
     bounds: Array | None
@@ -56,10 +58,27 @@ class Results:
         limit = HIDE_ABOVE * -self.mean(self.best, "return")
         return [name for name in self.ranking if -self.mean(name, "return") > limit]
 
+    @property
+    def partial(self) -> list[str]:
+        """Policies that flew fewer seeds than the others."""
+        return [name for name in self.ranking if self.count(name) < self.count(self.reference)]
+
+    def count(self, policy: str) -> int:
+        """Episodes that a policy flew."""
+        return len(self.flown.episodes[policy])
+
     def interval(self, policy: str, metric: str) -> Interval:
         """Mean of a metric with its 95 % interval."""
         line = self.summaries[policy].loc[metric]
         return float(line["mean"]), float(line["low"]), float(line["high"])
+
+    def cost(self, policy: str) -> Interval:
+        """Mean cost, minus the return, with its interval, m/s."""
+        return negative(self.interval(policy, "return"))
+
+    def behind(self, policy: str, other: str) -> Interval:
+        """How much more than a compared-with policy another one costs on the seeds of both, m/s."""
+        return negative(self.differences[policy][other]["return"])
 
     def mean(self, policy: str, metric: str) -> float:
         """Mean of a metric."""
@@ -89,30 +108,69 @@ def analyse(flown: list[Flown], bounds: Mapping[str, Array]) -> list[Results]:
 
 
 def _analyse_one(flown: Flown, bounds: Array | None, bar: "tqdm[None]") -> Results:
-    summaries = {}
-    for name, table in flown.episodes.items():
-        summaries[name] = summarise(table)
+    episodes = flown.episodes
+    longest = max(len(table) for table in episodes.values())
+    full = [name for name, table in episodes.items() if len(table) == longest]
+    reference = max(full, key=lambda name: episodes[name]["return"].mean())
+    summaries = {reference: summarise(episodes[reference])}
+    for name, table in episodes.items():
+        if name != reference:
+            whole = name in full
+            summaries[name] = summarise(table) if whole else estimate(table, episodes[reference], summaries[reference])
         bar.update()
     ranking = sorted(summaries, key=lambda name: -summaries[name].loc["return", "mean"])
-    references = dict.fromkeys([ranking[0], *([REFERENCE] if REFERENCE in summaries else [])])
-    differences = {reference: _differences(flown.episodes, reference) for reference in references}
-    regrets = {} if bounds is None else {name: _regret(table, bounds) for name, table in flown.episodes.items()}
-    return Results(flown, ranking, summaries, differences, bounds, regrets)
+    compared = dict.fromkeys([ranking[0], *([REFERENCE] if REFERENCE in summaries else [])])
+    differences = {other: _differences(episodes, other) for other in compared}
+    above = bounds is not None and (bounds > 0).all()  # where errors are free, so is the best flight
+    regrets = {} if not above else {name: _regret(table, bounds) for name, table in episodes.items()}
+    return Results(flown, ranking, reference, summaries, differences, bounds, regrets)
+
+
+def estimate(few: pd.DataFrame, reference: pd.DataFrame, summary: pd.DataFrame) -> pd.DataFrame:
+    """What a policy that flew some of the seeds would have as means over all: the reference's and the difference.
+
+    The seeds that were flown may be easy or hard ones; the difference to a policy that flew them, too, is nearly free
+    of that. Half-widths of the two intervals, of the reference over all seeds and of the difference, add as squares.
+
+    Args:
+        few: episodes of the policy.
+        reference: episodes of a policy on all seeds, these among them as the first.
+        summary: its means, see `formation_env.evaluation.summarise`.
+    """
+    rows = {}
+    for metric in METRICS:
+        mean, low, high = _difference(few, reference, metric)
+        base, base_low, base_high = (float(value) for value in summary.loc[metric])
+        below, above = math.hypot(mean - low, base - base_low), math.hypot(high - mean, base_high - base)
+        rows[metric] = (base + mean, base + mean - below, base + mean + above)
+    return pd.DataFrame.from_dict(rows, orient="index", columns=["mean", "low", "high"])
 
 
 def _regret(episodes: pd.DataFrame, bounds: Array) -> Interval:
     """Mean cost over bound, seed by seed, with its interval."""
-    found = regret(-episodes["return"].to_numpy(float), bounds)
+    found = regret(-episodes["return"].to_numpy(float), bounds[: len(episodes)])
     return found.mean, found.low, found.high
 
 
 def _differences(episodes: dict[str, pd.DataFrame], reference: str) -> dict[str, dict[str, Interval]]:
     """Policy -> metric -> difference to the reference's."""
     return {
-        name: {metric: paired_difference(table, episodes[reference], metric) for metric in COMPARED}
+        name: {metric: _difference(table, episodes[reference], metric) for metric in COMPARED}
         for name, table in episodes.items()
         if name != reference
     }
+
+
+def _difference(episodes: pd.DataFrame, reference: pd.DataFrame, metric: str) -> Interval:
+    """The paired difference on the seeds that both flew."""
+    common = min(len(episodes), len(reference))
+    return paired_difference(episodes.iloc[:common], reference.iloc[:common], metric)
+
+
+def negative(interval: Interval) -> Interval:
+    """Mean, low and high of minus a quantity."""
+    mean, low, high = interval
+    return -mean, -high, -low
 
 
 def significant(difference: Interval) -> bool:
@@ -120,80 +178,15 @@ def significant(difference: Interval) -> bool:
     return difference[1] > 0 or difference[2] < 0
 
 
-def reading(results: Results) -> list[str]:
-    """The result in plain sentences."""
-    best, episodes = results.best, len(results.flown.episodes[results.best])
-    cost = numbers(results.interval(best, "return"), -1)[0]
-    dv, error = (numbers(results.interval(best, metric))[0] for metric in ("delta_v_m_s", "position_error_mean_m"))
-    lines = [
-        f"{best} has the best mean return: it costs {cost} m/s per episode, of which {dv} m/s is thrust; "
-        f"its mean position error in hold is {error} m."
-    ]
-    if len(results.ranking) > 1:
-        lines.append(_comparison(results, results.ranking[1], episodes))
-    if results.regrets:
-        lines.append(_against_bound(results))
-    lost = [f"{name} in {count}" for name in results.ranking if (count := results.ended_early(name))]
-    if lost:
-        lines.append(f"Episodes that a limit ended early, of {episodes}: {', '.join(lost)}.")
-    return lines
-
-
-def _against_bound(results: Results) -> str:
-    """The best policy against what was possible."""
-    assert results.bounds is not None
-    ratio, low, high = numbers(results.regrets[results.best])
-    return (
-        f"Had everything been known beforehand, {number(float(results.bounds.mean()))} m/s would have been enough: "
-        f"{results.best} costs {ratio} times the bound of each seed (95 % interval {low} to {high})."
-    )
-
-
-def _comparison(results: Results, second: str, episodes: int) -> str:
-    """Best against second best, on the same seeds."""
-    best = results.best
-    difference = results.differences[best][second]["return"]
-    mean, high, low = numbers(difference, -1)
-    ours, theirs = (results.flown.episodes[name]["return"].to_numpy() for name in (best, second))
-    text = (
-        f"Next is {second}, {mean} m/s behind on the same seeds (95 % interval {low} to "
-        f"{high}); {best} is better on {int(np.sum(ours > theirs))} of {episodes} seeds. "
-    )
-    if significant(difference):
-        return text + "The difference is significant: the interval leaves out zero."
-    return text + "The difference is not significant: the interval holds zero."
-
-
-def number(value: float) -> str:
-    """A number for people: three significant digits, thousands with a comma; a dash if there is none."""
-    if not np.isfinite(value):
-        return "–"
-    text = f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
-    return text.replace("-", "−")
-
-
-def numbers(interval: Interval, factor: float = 1.0) -> tuple[str, str, str]:
-    """Mean, low and high for people, with decimals for two digits of the interval's width, but at most four digits."""
-    values = [factor * value for value in interval]
-    width = abs(values[2] - values[1])
-    if not width > 0:
-        mean, low, high = (number(value) for value in values)
-        return mean, low, high
-    digits = 3 - math.floor(math.log10(max(abs(values[0]), width)))
-    decimals = max(0, min(digits, 1 - math.floor(math.log10(width))))
-    mean, low, high = (f"{value:,.{decimals}f}".replace("-", "−") for value in values)
-    return mean, low, high
-
-
 def summary_table(results: list[Results]) -> pd.DataFrame:
-    """All means and intervals: env, policy, metric, mean, low, high."""
+    """All means and intervals: env, policy, metric, mean, low, high, episodes."""
     lines = [
-        (item.flown.label, name, metric, *item.interval(name, metric))
+        (item.flown.label, name, metric, *item.interval(name, metric), item.count(name))
         for item in results
         for name in item.flown.episodes
         for metric in METRICS
     ]
-    return pd.DataFrame(lines, columns=["env", "policy", "metric", "mean", "low", "high"])
+    return pd.DataFrame(lines, columns=["env", "policy", "metric", "mean", "low", "high", "episodes"])
 
 
 def episode_table(results: list[Results]) -> pd.DataFrame:

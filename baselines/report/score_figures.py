@@ -5,12 +5,14 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import plotly.graph_objects as go
 
 from baselines.report import style
-from baselines.report.results import Interval, Results, number
+from baselines.report.results import Interval, Results
 from baselines.report.scales import Scale, round_values, view_buttons, without_zeros
 from baselines.report.style import Look
+from baselines.report.words import number
 from formation_env.scenario import Reward
 
 Looks = dict[str, Look]
@@ -29,7 +31,7 @@ def cost_figure(results: Results, looks: Looks) -> go.Figure:
         figure.add_trace(_dots(costs[name][dots], row + _spread(len(dots)), looks[name]))
         seeds = results.flown.episodes[name]["seed"].to_numpy()[dots]
         figure.data[-1].update(customdata=seeds, hovertemplate="%{x:.4g} m/s, seed %{customdata}", name=name)
-        figure.add_trace(_mean_bar(results.interval(name, "return"), row, name))
+        figure.add_trace(_mean_bar(results.cost(name), row, name))
     figure.update_xaxes(style.axis("cost = −return: Δv + weighted mean error, m/s"))
     figure.update_yaxes(style.axis(""), tickvals=list(range(len(rows))), ticktext=rows)
     scales = _views([costs[name] for name in rows], [costs[name] for name in rows if name not in results.hidden])
@@ -55,11 +57,11 @@ def _apply(figure: go.Figure, layouts: list[dict[str, Any]], traces: list[dict[s
         figure.update_layout(margin_t=48)
 
 
-def _mean_bar(returns: Interval, row: int, name: str) -> go.Scatter:
+def _mean_bar(cost: Interval, row: int, name: str) -> go.Scatter:
     """A bar at the mean cost, with the whisker of its interval; the page's style sheet colours it."""
-    mean, low, high = returns
-    bar = go.Scatter(x=[-mean], y=[row], mode="markers", marker={"size": 1, "color": style.NEUTRAL}, name=name)
-    whisker = {"type": "data", "symmetric": False, "array": [mean - low], "arrayminus": [high - mean]}
+    mean, low, high = cost
+    bar = go.Scatter(x=[mean], y=[row], mode="markers", marker={"size": 1, "color": style.NEUTRAL}, name=name)
+    whisker = {"type": "data", "symmetric": False, "array": [high - mean], "arrayminus": [mean - low]}
     look = {"color": style.NEUTRAL, "thickness": 2}
     bar.update(error_x=whisker | look | {"width": 5}, error_y={"type": "data", "array": [0.4], "width": 0} | look)
     return bar.update(hovertemplate="mean %{x:.4g} m/s")
@@ -88,9 +90,10 @@ def trade_figure(results: Results, looks: Looks) -> go.Figure:
         custom = tables[name][["delta_v_m_s", "position_error_mean_m", "seed"]].to_numpy()[shown]
         hover = "Δv %{customdata[0]:.4g} m/s, error %{customdata[1]:.4g} m, seed %{customdata[2]}"
         figure.data[-1].update(customdata=custom, hovertemplate=hover, name=name, legendgroup=name, showlegend=False)
-        figure.add_trace(_mean_dot(float(x[name].mean()), float(y[name].mean()), looks[name], name))
-        means = number(results.mean(name, "delta_v_m_s")), number(results.mean(name, "position_error_mean_m"))
-        figure.data[-1].update(hovertemplate=f"mean: Δv {means[0]} m/s, error {means[1]} m")
+        means = results.mean(name, "delta_v_m_s"), results.mean(name, "position_error_mean_m")
+        shown_at = (mean or float(placed[name].mean()) for mean, placed in zip(means, (x, y), strict=True))
+        figure.add_trace(_mean_dot(*shown_at, looks[name], name))
+        figure.data[-1].update(hovertemplate=f"mean: Δv {number(means[0])} m/s, error {number(means[1])} m")
     figure.update_layout(legend={"orientation": "h", "x": 0, "y": -0.2, "yanchor": "top"})
     figure.update_xaxes(style.axis("Δv, m/s"))
     figure.update_yaxes(style.axis("mean position error in hold, m"))
@@ -100,9 +103,9 @@ def trade_figure(results: Results, looks: Looks) -> go.Figure:
 
 def _placed(results: Results, metric: str) -> dict[str, np.ndarray]:
     """Where the episodes of each policy stand on an axis."""
-    names = list(results.flown.episodes)
-    values = [results.flown.episodes[name][metric].to_numpy(float) for name in names]
-    return dict(zip(names, without_zeros(np.array(values)), strict=True))
+    values = pd.concat({name: table[metric] for name, table in results.flown.episodes.items()})
+    placed = pd.Series(without_zeros(values.to_numpy(float)), values.index)
+    return {name: placed.loc[name].to_numpy() for name in results.flown.episodes}
 
 
 def _mean_dot(x: float, y: float, look: Look, name: str) -> go.Scatter:

@@ -14,18 +14,6 @@ FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', s
 MAX_POINTS: Final = 1500
 """Points of one line or cloud; longer ones are thinned out."""
 
-# Okabe and Ito's colours, told apart by colour-blind readers; their black and yellow do not read on dark and on light.
-_FIXED: Final = {
-    "lqr": "#0072B2",
-    "lqr_tracking": "#56B4E9",
-    "smc": "#D55E00",
-    "zero": NEUTRAL,
-    "random": "#CC79A7",
-}
-_FREE: Final = ("#009E73", "#E69F00")
-_SYMBOLS: Final = ("circle", "square", "triangle-up", "diamond", "x", "triangle-down", "star", "pentagon")
-_DASHES: Final = ("solid", "dash", "dot", "dashdot")
-
 
 @dataclass(frozen=True)
 class Look:
@@ -42,17 +30,35 @@ class Look:
     dash: str
 
 
+# Okabe and Ito's colours, told apart by colour-blind readers, but for their black and yellow, which do not read on dark
+# and on light. They do not go round, so symbols differ everywhere, and dashes where two colours may be mistaken.
+_FIXED: Final = {
+    "lqr": Look("#0072B2", "circle", "solid"),
+    "mpc": Look("#AA3377", "star", "solid"),
+    "lqr_finite": Look("#7B6FD0", "diamond", "dot"),
+    "lqr_tracking": Look("#56B4E9", "square", "dash"),
+    "smc": Look("#D55E00", "triangle-up", "solid"),
+    "two_impulse": Look("#CC79A7", "triangle-down", "solid"),
+    "deadband": Look("#8C6D1F", "pentagon", "dash"),
+    "zero": Look(NEUTRAL, "x", "dot"),
+    "random": Look(NEUTRAL, "cross", "dashdot"),
+}
+_FREE_COLORS: Final = ("#009E73", "#E69F00")
+_FREE_SYMBOLS: Final = ("hexagon", "hourglass", "bowtie", "diamond-tall")
+_FREE_DASHES: Final = ("solid", "dash", "dot", "dashdot")
+
+
 def looks(policies: Iterable[str]) -> dict[str, Look]:
     """The look of each policy: the known ones have their own, others get what is free, in order."""
-    result: dict[str, Look] = {}
-    free = 0
-    for index, name in enumerate(dict.fromkeys(policies)):
-        color, dash = _FIXED.get(name), "solid"
-        if color is None:
-            color, dash = _FREE[free % len(_FREE)], _DASHES[free // 2 % len(_DASHES)]
-            free += 1
-        result[name] = Look(color, _SYMBOLS[index % len(_SYMBOLS)], dash)
-    return result
+    names = list(dict.fromkeys(policies))
+    places = {name: place for place, name in enumerate(name for name in names if name not in _FIXED)}
+    return {name: _FIXED[name] if name in _FIXED else _free(places[name]) for name in names}
+
+
+def _free(place: int) -> Look:
+    """A look that no known policy has."""
+    color, dash = place % len(_FREE_COLORS), place // len(_FREE_COLORS) % len(_FREE_DASHES)
+    return Look(_FREE_COLORS[color], _FREE_SYMBOLS[place % len(_FREE_SYMBOLS)], _FREE_DASHES[dash])
 
 
 def thinned(length: int) -> np.ndarray:

@@ -2,47 +2,57 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Final
 
-from baselines.report.bounds import find_bounds
+from baselines.factories import PolicyFactory
 from baselines.report.document import document, to_json
-from baselines.report.flights import Environment, PolicyFactory, fly
+from baselines.report.flights import Environment, name_environments
 from baselines.report.page import render
 from baselines.report.results import analyse, episode_table, summary_table
+from baselines.report.rounds import fly
+from baselines.report.wanted import Wanted
 from formation_env.files import write_texts
-from formation_env.seeds import seeds as seeds_of
 
-FILES = ("episodes.csv", "summary.csv", "report.json", "report.html")
+FILES: Final = ("episodes.csv", "summary.csv", "sweep.csv", "report.json", "report.html")
 
 
 def write_report(
-    policies: Mapping[str, PolicyFactory], envs: Sequence[Environment], episodes: int, out: Path, command: str
+    policies: Mapping[str, PolicyFactory],
+    envs: Sequence[Environment],
+    wanted: Wanted,
+    out: Path,
+    command: str,
+    workers: int = 1,
 ) -> Path:
     """Fly policies on environments with the same test seeds, and write the report's files.
 
     Args:
-        policies: label -> factory that makes the policy for a scenario (or gives None if it has none for it).
+        policies: label -> factory; with more than one process they must be importable, so no lambdas.
         envs: registered ids, names or paths of scenarios, or Scenarios.
-        episodes: seeds per environment.
-        out: folder of `FILES` and of the bounds that were found; made if it does not exist.
+        wanted: how much to fly.
+        out: folder of `FILES`, of the bounds that were found and of the flights to resume from; made if there is none.
         command: the command line that redoes the report; noted in it.
+        workers: processes to fly in; with 1 all is flown in this one.
 
     Returns:
         Path of the HTML page.
 
     Raises:
-        ConfigError: a faulty environment or policy.
+        ConfigError: a faulty environment or policy, or an environment without any.
         ValueError: no or too many episodes.
-        OSError: the folder cannot be written; nothing in it has changed then.
+        RuntimeError: the bound's solver failed.
+        OSError: the folder cannot be written; nothing in it has changed then, but for bounds and kept flights.
     """
-    seeds = seeds_of("test", episodes)
-    flown = fly(policies, envs, seeds)
-    results = analyse(flown, find_bounds(flown, seeds, out))
-    data = document(results, seeds, command)
+    scenarios = name_environments(envs)
+    found = fly(policies, scenarios, wanted, out, workers)
+    results = analyse(found.flown, found.bounds)
+    data = document(results, found.sweep, wanted, command)
     contents = (
         episode_table(results).to_csv(index=False),
         summary_table(results).to_csv(index=False),
+        found.sweep.episodes.to_csv(index=False),
         to_json(data),
-        render(results, data),
+        render(results, found.sweep, data),
     )
     write_texts(out, dict(zip(FILES, contents, strict=True)))
-    return out / "report.html"
+    return out / FILES[-1]

@@ -1,6 +1,7 @@
 """Pictures of a sweep: the front, and a sheet of what each quantity does to the cost."""
 
 import math
+from collections.abc import Collection, Iterable
 
 import numpy as np
 import pandas as pd
@@ -19,41 +20,47 @@ _PER_ROW = 2
 _PANEL_HEIGHT = 300
 
 
-def looks_of(policies: list[str]) -> Looks:
+def looks_of(policies: Iterable[str]) -> Looks:
     """The report's look of each policy; the bound is grey and dashed."""
-    return style.looks(policies) | {BOUND: Look(style.NEUTRAL, "star", "dash")}
+    return style.looks(name for name in policies if name != BOUND) | {BOUND: Look(style.NEUTRAL, "circle-open", "dash")}
 
 
-def front_figure(summary: pd.DataFrame, looks: Looks) -> go.Figure:
+def front_figure(summary: pd.DataFrame, looks: Looks, aside: Collection[str]) -> go.Figure:
     """Mean delta-v against mean hold error, one line per policy, a dot for each price of errors.
+
+    A policy that flies the same at all prices, as a learned one does, is one dot.
 
     Args:
         summary: of one environment, see `flights.summarise`.
         looks: of the policies.
+        aside: policies that are hidden at first; the axes fit the others.
     """
     front = summary[summary["quantity"] == FRONT]
     figure = go.Figure()
     figure.update_layout(style.base_layout(460))
     for name, line in front.groupby("policy", sort=False):
-        trace = go.Scatter(x=line["delta_v_m_s"], y=line["position_error_mean_m"], mode="lines+markers", name=name)
+        same = line[["delta_v_m_s", "position_error_mean_m"]].nunique().max() == 1
+        shown = {"mode": "markers" if same else "lines+markers", "visible": "legendonly" if name in aside else True}
+        trace = go.Scatter(x=line["delta_v_m_s"], y=line["position_error_mean_m"], name=name, **shown)
         trace.update(_look(looks[str(name)]), customdata=line[["value", "cost_m_s"]].to_numpy())
         hover = "Δv %{x:.4g} m/s, error %{y:.4g} m<br>price × %{customdata[0]:g}: cost %{customdata[1]:.4g} m/s"
         figure.add_trace(trace.update(hovertemplate=hover))
     figure.update_xaxes(style.axis("mean Δv, m/s"))
     figure.update_yaxes(style.axis("mean position error in hold, m"))
     for axis, column in (("xaxis", "delta_v_m_s"), ("yaxis", "position_error_mean_m")):
-        _fit(figure, axis, front[column].to_numpy(float))
+        _fit(figure, axis, front.loc[~front["policy"].isin(aside), column].to_numpy(float))
         if figure.layout[axis].type == "log":
             figure.layout[axis].dtick = "D2"  # labels at 1, 2 and 5: there is room for them
     return figure.update_layout(legend={"orientation": "h", "x": 0, "y": -0.16, "yanchor": "top"})
 
 
-def robustness_figure(summary: pd.DataFrame, looks: Looks) -> go.Figure:
+def robustness_figure(summary: pd.DataFrame, looks: Looks, aside: Collection[str]) -> go.Figure:
     """Mean cost with its interval against each quantity, a small panel each.
 
     Args:
         summary: of one environment, see `flights.summarise`.
         looks: of the policies.
+        aside: policies that are hidden at first; the axes fit the others.
     """
     quantities = [name for name in VARIATIONS if name != FRONT]
     rows = math.ceil(len(quantities) / _PER_ROW)
@@ -65,10 +72,13 @@ def robustness_figure(summary: pd.DataFrame, looks: Looks) -> go.Figure:
         for name, line in panel.groupby("policy", sort=False):
             trace = _cost_line(str(name), line, looks[str(name)]).update(showlegend=index == 0)
             band = _band(str(name), line, looks[str(name)])
+            if name in aside:
+                trace.visible = band.visible = "legendonly"
             figure.add_traces([band, trace], rows=row + 1, cols=column + 1)
         number = "" if index == 0 else str(index + 1)
-        _label(figure, number, VARIATIONS[quantity])
-        _fit(figure, f"yaxis{number}", panel[["cost_low_m_s", "cost_high_m_s"]].to_numpy(float))
+        _label(figure, number, VARIATIONS[quantity], panel["value"].unique().tolist())
+        near = panel[~panel["policy"].isin(aside)]
+        _fit(figure, f"yaxis{number}", near[["cost_low_m_s", "cost_high_m_s"]].to_numpy(float))
     return figure.update_layout(legend={"orientation": "h", "x": 0, "y": 1.01, "yanchor": "bottom"})
 
 
@@ -94,9 +104,8 @@ def _look(look: Look) -> dict[str, dict[str, object]]:
     return {"line": {"color": look.color, "dash": look.dash, "width": 1.8}, "marker": marker}
 
 
-def _label(figure: go.Figure, number: str, variation: Variation) -> None:
+def _label(figure: go.Figure, number: str, variation: Variation, values: list[float]) -> None:
     """Titles of a panel's axes; the varied values are its ticks."""
-    values = list(variation.values)
     texts = [variation.names.get(value, f"{value:g}") for value in values]
     across = style.axis(variation.label) | {"type": "log" if variation.log else "linear"}
     pad = {"range": [-0.4, len(values) - 0.6]} if variation.names else {}

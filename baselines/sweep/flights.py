@@ -1,19 +1,20 @@
 """What is flown for a sweep, and what comes of it: one line per episode."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Self
 
 import numpy as np
 import pandas as pd
 from pydantic import ValidationError
 
+from baselines.factories import PolicyFactory, describe
 from baselines.fuel import fuel_optimal
-from baselines.registry import gains_path, make_policy
+from baselines.jobs import Progress
 from baselines.sweep.variations import FRONT, VARIATIONS
 from formation_env.dynamics import NONLINEAR
 from formation_env.dynamics.base import Array
-from formation_env.evaluation import bootstrap_interval, evaluate
+from formation_env.evaluation import Policy, bootstrap_interval, evaluate
 from formation_env.scenario import Scenario
 from formation_env.schedule import FIELDS, OFFSETS, build_schedule
 from formation_env.settings import ConfigError
@@ -27,27 +28,25 @@ COLUMNS: Final = [*KEYS, "seed", *METRICS, "ended_early"]
 
 @dataclass(frozen=True)
 class Point:
-    """One value of one quantity on one environment, flown by all policies on the same seeds.
+    """One varied environment, flown by all policies on the same seeds.
 
     Attributes:
         env: name of the environment.
-        quantity: what is varied.
-        value: of the quantity.
+        places: quantities and their values that make it; the scenario's own value of several is one point.
         flown: the scenario.
-        believed: the scenario that policies are made for.
+        believed: the scenario that policies are told of.
         original: the scenario that was varied; its gains are used throughout.
-        policies: their names.
+        policies: label -> factory.
         seeds: one per episode.
         bound_seeds: those on which the bound is solved, too.
     """
 
     env: str
-    quantity: str
-    value: float
+    places: tuple[tuple[str, float], ...]
     flown: Scenario
     believed: Scenario
     original: Scenario
-    policies: tuple[str, ...]
+    policies: Mapping[str, PolicyFactory]
     seeds: tuple[int, ...]
     bound_seeds: tuple[int, ...] = ()
 
@@ -56,11 +55,19 @@ class Point:
         """How long it takes, in steps."""
         return self.flown.num_steps * (len(self.policies) + len(self.bound_seeds))
 
-    def fly(self, progress: Callable[[int], Any]) -> pd.DataFrame:
+    @property
+    def key(self) -> Any:
+        """All that the table depends on; None if a policy does not tell its settings."""
+        told = {name: describe(factory, self.original) for name, factory in self.policies.items()}
+        place = (self.env, self.places, self.flown, self.believed)
+        return None if None in told.values() else (*place, told, self.seeds, self.bound_seeds)
+
+    def fly(self, progress: Progress) -> pd.DataFrame:
         """Fly it; progress is called with the cost of what was flown since the last call.
 
         Returns:
-            One line per policy and seed: `COLUMNS`.
+            One line per place, policy and seed, `COLUMNS`: the bound's on the front only, and none of a policy that
+            there is not for the scenario.
 
         Raises:
             ConfigError: a policy cannot be made.
@@ -68,17 +75,23 @@ class Point:
             ModuleNotFoundError: Clarabel is not installed, and the bound is wanted.
         """
         tables = []
-        for name in self.policies:
-            tables.append(self._fly_policy(name))
+        for name, factory in self.policies.items():
+            policy = factory(self.original, self.believed)
+            if policy is not None:
+                tables.append(self._fly(name, policy))
             progress(self.flown.num_steps)
+        bounds = []
         for seed in self.bound_seeds:
-            tables.append(self._solve_bound(seed))
+            bounds.append(self._solve_bound(seed))
             progress(self.flown.num_steps)
-        table = pd.concat(tables, ignore_index=True)
-        return table.assign(env=self.env, quantity=self.quantity, value=self.value)[COLUMNS]
+        placed = [
+            table.assign(env=self.env, quantity=quantity, value=value)
+            for quantity, value in self.places
+            for table in (*tables, *(bounds if quantity == FRONT else ()))
+        ]
+        return pd.concat(placed, ignore_index=True)[COLUMNS]
 
-    def _fly_policy(self, name: str) -> pd.DataFrame:
-        policy = make_policy(name, self.believed, gains_path(self.original))
+    def _fly(self, name: str, policy: Policy) -> pd.DataFrame:
         flown = evaluate(policy, self.flown, self.seeds)
         early = flown["steps"] < self.flown.num_steps
         return flown.assign(policy=name, cost_m_s=-flown["return"], ended_early=early)
@@ -104,16 +117,21 @@ def mean_hold_error_m(scenario: Scenario, states: Array) -> float:
 
 
 def points(
-    scenarios: Mapping[str, Scenario], policies: Sequence[str], seeds: Sequence[int], bound_episodes: int
+    scenarios: Mapping[str, Scenario],
+    policies: Mapping[str, PolicyFactory],
+    seeds: Sequence[int],
+    bound_episodes: int,
+    coarse: bool = False,
 ) -> dict[str, Point]:
     """All that a sweep flies, by name.
 
     Args:
         scenarios: label -> environment.
-        policies: names.
+        policies: label -> factory.
         seeds: one per episode, the same everywhere.
         bound_episodes: how many of the seeds the bound is solved on, along the front; none where the truth is
             nonlinear.
+        coarse: a few values of each quantity only.
 
     Raises:
         ConfigError: a price of errors of 0, or a scenario that a variation does not fit.
@@ -123,30 +141,73 @@ def points(
         if scenario.reward.error_weight == 0:
             raise ConfigError(f"sweep: {env}: reward.error_weight: must be > 0 for a front, got 0")
         solved = tuple(seeds)[:bound_episodes] if scenario.dynamics != NONLINEAR else ()
-        for quantity, value, flown, believed in _varied(env, scenario):
-            made[f"{env} {quantity} {value:g}"] = Point(
+        places: dict[tuple[Scenario, Scenario], list[tuple[str, float]]] = {}
+        for quantity, value, flown, believed in _varied(env, scenario, coarse):
+            places.setdefault((flown, believed), []).append((quantity, value))
+        for (flown, believed), made_by in places.items():
+            made[f"{env} {made_by[0][0]} {made_by[0][1]:g}"] = Point(
                 env=env,
-                quantity=quantity,
-                value=value,
+                places=tuple(made_by),
                 flown=flown,
                 believed=believed,
                 original=scenario,
-                policies=tuple(policies),
+                policies=policies,
                 seeds=tuple(seeds),
-                bound_seeds=solved if quantity == FRONT else (),
+                bound_seeds=solved if any(quantity == FRONT for quantity, _ in made_by) else (),
             )
     return made
 
 
-def _varied(env: str, scenario: Scenario) -> Iterator[tuple[str, float, Scenario, Scenario]]:
+def _varied(env: str, scenario: Scenario, coarse: bool) -> Iterator[tuple[str, float, Scenario, Scenario]]:
     for quantity, variation in VARIATIONS.items():
-        for value in variation.values:
+        for value in variation.few if coarse else variation.values:
             try:
                 flown, believed = variation.vary(scenario, value)
             except ValidationError as error:
                 fault = error.errors()[0]["msg"].removeprefix("Value error, ")
                 raise ConfigError(f"sweep: {env}: {quantity} = {value:g}: {fault}") from None
             yield quantity, value, flown, believed
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """What came of a sweep.
+
+    Attributes:
+        episodes: one line per episode: `COLUMNS`.
+        summary: see `summarise`.
+        faults: environment -> why it has none.
+    """
+
+    episodes: pd.DataFrame
+    summary: pd.DataFrame
+    faults: dict[str, str]
+
+    @classmethod
+    def join(cls, tables: Sequence[pd.DataFrame], faults: dict[str, str]) -> Self:
+        """The sweep from the tables of its points: by environment, quantity and value, the rest as it was flown."""
+        episodes = pd.concat(tables, ignore_index=True) if tables else pd.DataFrame(columns=COLUMNS)
+        places = {name: place for place, name in enumerate((*episodes["env"].unique(), *VARIATIONS))}
+        for key in ("value", "quantity", "env"):
+            sort = None if key == "value" else lambda names: names.map(places)
+            episodes = episodes.sort_values(key, key=sort, kind="stable", ignore_index=True)
+        return cls(episodes, summarise(episodes), faults)
+
+    def of(self, env: str) -> Self:
+        """The share of one environment."""
+        own = (table[table["env"] == env] for table in (self.episodes, self.summary))
+        return type(self)(*own, {name: fault for name, fault in self.faults.items() if name == env})
+
+    def as_data(self) -> dict[str, Any]:
+        """Means, intervals and what was varied, as plain data."""
+        return {
+            "quantities": {
+                name: {"label": VARIATIONS[str(name)].label, "values": values.unique().tolist()}
+                for name, values in self.summary.groupby("quantity", sort=False)["value"]
+            },
+            "summary": self.summary.to_dict(orient="records"),
+            "left_out": self.faults,
+        }
 
 
 def summarise(episodes: pd.DataFrame) -> pd.DataFrame:

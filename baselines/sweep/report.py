@@ -1,28 +1,26 @@
 """From a sweep's flights to its files."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
-import pandas as pd
-from tqdm import tqdm
-
-from baselines.registry import POLICIES
+from baselines import jobs
+from baselines.factories import PolicyFactory
+from baselines.kept import keep
 from baselines.report.document import to_json, versions
 from baselines.report.flights import Environment, name_environments
-from baselines.sweep.flights import points, summarise
+from baselines.sweep.flights import Sweep, points
 from baselines.sweep.report_page import render
-from baselines.sweep.variations import VARIATIONS
-from baselines.thesis import jobs
 from formation_env.files import write_texts
 from formation_env.scenario import Scenario
 from formation_env.seeds import seeds as seeds_of
-from formation_env.settings import ConfigError, nearest
 
 FILES: Final = ("sweep.csv", "sweep.json", "sweep.html")
+FLOWN: Final = "flown"
+"""Where finished flights are kept, inside the sweep's folder."""
 
 
 @dataclass(frozen=True)
@@ -30,20 +28,28 @@ class Wanted:
     """What to sweep.
 
     Attributes:
-        policies: names of policies.
         episodes: test seeds of each point.
         bound_episodes: seeds, among them, that the bound's front is solved on.
+        resume: whether finished flights are kept, and those that were kept are not flown again.
     """
 
-    policies: tuple[str, ...] = ("lqr", "smc", "lqr_tracking")
     episodes: int = 20
     bound_episodes: int = 5
+    resume: bool = False
 
 
-def write_sweep(envs: Sequence[Environment], wanted: Wanted, out: Path, command: str, workers: int) -> Path:
+def write_sweep(
+    policies: Mapping[str, PolicyFactory],
+    envs: Sequence[Environment],
+    wanted: Wanted,
+    out: Path,
+    command: str,
+    workers: int,
+) -> Path:
     """Fly the sweep, and write `FILES`; they appear only when all are complete.
 
     Args:
+        policies: label -> factory.
         envs: registered ids, names or paths of scenarios, or Scenarios.
         wanted: what to sweep.
         out: folder to write to; made if it does not exist.
@@ -54,34 +60,25 @@ def write_sweep(envs: Sequence[Environment], wanted: Wanted, out: Path, command:
         Path of the HTML page.
 
     Raises:
-        ConfigError: a faulty environment or policy, or a variation that does not fit an environment.
+        ConfigError: a faulty environment, or a variation that does not fit an environment.
         RuntimeError: the bound's solver failed.
         ModuleNotFoundError: Clarabel is not installed, and the bound is wanted.
         OSError: the folder cannot be written; nothing in it has changed then.
     """
-    for name in wanted.policies:
-        if name not in POLICIES:
-            raise ConfigError(f"no policy named {name!r}; {nearest(name, POLICIES)}")
     scenarios, seeds = name_environments(envs), seeds_of("test", wanted.episodes)
-    policies = tuple(dict.fromkeys(wanted.policies))
     work = points(scenarios, policies, seeds, wanted.bound_episodes)
     if any(job.bound_seeds for job in work.values()):
         import_module("clarabel")  # that it is missing should be known before the flights, not after
-    first = "flying (the very first run compiles the kernel)"
-    with tqdm(
-        total=sum(job.cost for job in work.values()), desc=first, unit="step", unit_scale=True, dynamic_ncols=True
-    ) as bar:
-        found = jobs.run(work, bar.update, workers)
-    episodes = pd.concat([found[name] for name in work], ignore_index=True)
-    summary = summarise(episodes)
-    data = document(scenarios, summary, seeds, wanted, command)
-    contents = (episodes.to_csv(index=False), to_json(data), render(scenarios, episodes, summary, data))
+    found = jobs.fly(keep(work, out / FLOWN if wanted.resume else None), workers)
+    sweep = Sweep.join([found[name] for name in work], {})
+    data = document(scenarios, sweep, seeds, wanted, command)
+    contents = (sweep.episodes.to_csv(index=False), to_json(data), render(scenarios, sweep, data))
     write_texts(out, dict(zip(FILES, contents, strict=True)))
     return out / FILES[-1]
 
 
 def document(
-    scenarios: dict[str, Scenario], summary: pd.DataFrame, seeds: Sequence[int], wanted: Wanted, command: str
+    scenarios: dict[str, Scenario], sweep: Sweep, seeds: Sequence[int], wanted: Wanted, command: str
 ) -> dict[str, Any]:
     """All that is needed to redo and to judge the sweep, as plain data."""
     return {
@@ -91,7 +88,5 @@ def document(
         "seeds": list(seeds),
         "bound_seeds": list(seeds)[: wanted.bound_episodes],
         "intervals": "bootstrap, 95 %, of the mean",
-        "quantities": {name: {"label": item.label, "values": item.values} for name, item in VARIATIONS.items()},
         "environments": {label: asdict(scenario) for label, scenario in scenarios.items()},
-        "summary": summary.to_dict(orient="records"),
-    }
+    } | sweep.as_data()

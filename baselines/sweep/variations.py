@@ -30,6 +30,12 @@ class Variation:
     log: bool = False
     names: dict[float, str] = field(default_factory=dict)
 
+    @property
+    def few(self) -> tuple[float, ...]:
+        """Every second value and the middle one, for a quick look."""
+        middle = len(self.values) // 2
+        return tuple(value for index, value in enumerate(self.values) if index % 2 == 0 or index == middle)
+
 
 def error_weight(scenario: Scenario, factor: float) -> Pair:
     """Price of the mean error, in units of the scenario's."""

@@ -1,12 +1,8 @@
-"""Flights as data, and flown on all cores: what to fly is a table of `Job`s."""
+"""Flights as data: what to fly is a table of `Job`s, for `baselines.jobs`."""
 
-import multiprocessing
-import signal
-from collections.abc import Callable, Mapping
-from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from collections.abc import Callable
 from dataclasses import dataclass
-from multiprocessing.sharedctypes import Synchronized
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 import numpy as np
 
@@ -16,8 +12,6 @@ from baselines.thesis import scenarios
 from baselines.thesis.flights import FEW, Flights, fly
 from formation_env.scenario import Scenario
 
-POLL_S: Final = 0.2
-"""How often the progress of other processes is asked for."""
 _ENVIRONMENT_COST: Final = 2
 """Time of a batch's step, in steps of one law."""
 
@@ -84,76 +78,3 @@ class Job:
             None if self.start is None else np.array(self.start),
             lambda _: progress(share),
         )
-
-
-class Work(Protocol):
-    """A `Job`, or anything else that can be sent to another process and flown there."""
-
-    @property
-    def cost(self) -> int:
-        """How long it takes, in steps of one law."""
-        ...
-
-    def fly(self, progress: Callable[[int], Any]) -> Any:
-        """Fly it; progress is called with the cost of what was flown since the last call."""
-        ...
-
-
-def run(jobs: Mapping[str, Work], progress: Callable[[int], Any], workers: int) -> dict[str, Any]:
-    """Fly all jobs, the longest ones first, and give what each found.
-
-    Args:
-        jobs: by name.
-        progress: called with the cost of what was flown since the last call.
-        workers: processes; with 1 all is flown in this one.
-    """
-    longest_first = sorted(jobs, key=lambda name: -jobs[name].cost)
-    if workers == 1:
-        return {name: jobs[name].fly(progress) for name in longest_first}
-    context = multiprocessing.get_context("spawn")
-    counter = context.Value("q", 0)
-    with ProcessPoolExecutor(workers, context, _begin, (counter,)) as pool:
-        try:
-            futures = {name: pool.submit(_fly, jobs[name]) for name in longest_first}
-            waiting, seen = set(futures.values()), 0
-            while waiting:
-                done, waiting = wait(waiting, POLL_S, FIRST_COMPLETED)
-                for future in done:
-                    future.result()  # raises what went wrong there
-                now = counter.value
-                progress(now - seen)
-                seen = now
-        except BaseException:
-            _stop(pool)
-            raise
-        return {name: future.result() for name, future in futures.items()}
-
-
-def _stop(pool: ProcessPoolExecutor) -> None:
-    """End the processes at once, in the midst of their flights."""
-    pool.shutdown(wait=False, cancel_futures=True)
-    for process in multiprocessing.active_children():
-        process.terminate()
-
-
-_counter: "Synchronized[int] | None" = None
-"""In a worker process: what all of them have flown."""
-
-
-def _begin(counter: "Synchronized[int]") -> None:
-    """Set up a worker process; an interrupt is for the main one, which then ends this."""
-    global _counter
-    _counter = counter
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _fly(job: Work) -> Any:
-    """Fly a job in a worker process."""
-    counter = _counter
-    assert counter is not None, "set by _begin"
-
-    def advance(cost: int) -> None:
-        with counter.get_lock():
-            counter.value += cost
-
-    return job.fly(advance)

@@ -68,7 +68,7 @@ def _believing(scenario: Scenario, dynamics: str) -> Scenario:
 
 @dataclass(frozen=True)
 class Trial:
-    """All laws of a comparison in one world, on the same seeds; a `Work` of `baselines.thesis.jobs`.
+    """All laws of a comparison in one world, on the same seeds; a `Work` of `baselines.jobs`.
 
     Attributes:
         comparison: what is flown.

@@ -103,7 +103,7 @@ def strayed(orbit: Orbit, states: Array) -> dict[str, Array]:
 
 @dataclass(frozen=True)
 class Survey:
-    """Errors of every model, formation and size about one leader; a `Work` of `baselines.thesis.jobs`.
+    """Errors of every model, formation and size about one leader; a `Work` of `baselines.jobs`.
 
     Attributes:
         orbit: the leader's.

@@ -7,12 +7,12 @@ from typing import Any, Final
 
 from tqdm import tqdm
 
+from baselines import jobs
 from baselines.report.document import versions
-from baselines.thesis import claims, jobs, plan, report_models, tables
+from baselines.thesis import claims, plan, report_models, tables
 from baselines.thesis.claims_flights import Effort
 from baselines.thesis.figures import FIGURES, Figure, style
 from baselines.thesis.flights import Flights
-from baselines.thesis.jobs import Work
 from baselines.thesis.report_page import Content, Picture, Table, render
 from formation_env.files import write_files
 from formation_env.seeds import seeds
@@ -71,12 +71,12 @@ def write_thesis(out: Path, wanted: Wanted, command: str, workers: int) -> Path:
         ValueError: too many episodes.
         OSError: the folder cannot be written; nothing in it has changed then.
     """
-    work: dict[str, Work] = dict(plan.jobs(seeds("test", wanted.episodes), wanted.step_s, wanted.periods))
+    work: dict[str, jobs.Work] = dict(plan.jobs(seeds("test", wanted.episodes), wanted.step_s, wanted.periods))
     if wanted.claims:
         work |= claims.jobs(wanted.effort)
     if wanted.models:
         work |= report_models.jobs(seeds("test", wanted.episodes))
-    flown = fly(work, workers)
+    flown = jobs.fly(work, workers)
     contents: dict[str, bytes] = {}
     with style.settings():
         bar = tqdm(FIGURES.items(), desc="drawing", unit="figure", dynamic_ncols=True)
@@ -105,19 +105,6 @@ def judged(content: Content, found: claims.Tables, contents: dict[str, bytes]) -
     }
     contents |= {f"{table.name}.csv": table.data.to_csv(index=False).encode() for table in below}
     return replace(content, claims=found.claims, tables=below)
-
-
-def fly(wanted: Mapping[str, Work], workers: int) -> dict[str, Any]:
-    """Fly all jobs with a progress bar.
-
-    Args:
-        wanted: by name.
-        workers: processes.
-    """
-    total = sum(job.cost for job in wanted.values())
-    first = "flying (the very first run compiles the kernel)"
-    with tqdm(total=total, desc=first, unit="step", unit_scale=True, smoothing=0.1, dynamic_ncols=True) as bar:
-        return jobs.run(wanted, bar.update, workers)
 
 
 def _draw(number: str, figure: Figure, flown: Mapping[str, Flights], contents: dict[str, Any]) -> Picture:

@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 import pandas as pd
 
-from baselines.report.results import number
+from baselines.report.words import number
 from baselines.thesis import model_costs
 from baselines.thesis.model_errors import MODELS, SIZES_M, SPANS, about, leader
 from formation_env.dynamics.base import Array

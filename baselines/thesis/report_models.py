@@ -7,10 +7,10 @@ from typing import Any, Final
 import pandas as pd
 from matplotlib.figure import Figure
 
+from baselines.jobs import Work
 from baselines.thesis import model_costs, model_errors, report_lessons
 from baselines.thesis.figures import model_errors as figures
 from baselines.thesis.figures import style
-from baselines.thesis.jobs import Work
 from baselines.thesis.report_page import Content, Picture, Table
 
 ERRORS, COSTS = "model errors ", "model costs "

@@ -10,7 +10,7 @@ import jinja2
 import numpy as np
 import pandas as pd
 
-from baselines.report.results import number
+from baselines.report.words import number
 from baselines.thesis.claim import Claim, Verdict
 
 

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from baselines.report.results import number
+from baselines.report.words import number
 from baselines.thesis import plan
 from baselines.thesis.figures.drawings import (
     FAILED_LQR,
