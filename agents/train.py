@@ -14,11 +14,15 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import configure
 from tqdm import tqdm
 
+from agents.actor import Functions, to_bytes
 from agents.checkpoint import State, load_checkpoint, restore
 from agents.models import make_env, make_model
+from agents.pretraining.pretrain import pretrain
 from agents.runs import CHECKPOINT, START, TENSORBOARD, Run, load_run, start_run
+from agents.settings import SQUASH_OF
 from agents.start import start_from
 from agents.validation import Outcome, Validation
+from formation_env.files import write_files
 from formation_env.seeds import seeds
 from formation_env.settings import ConfigError
 
@@ -50,8 +54,13 @@ def train(run: Run, folder: Path, time_limit_s: float = math.inf) -> Outcome:
         ConfigError: the folder holds a run already, the seed is too large, or the actor to start from does not fit.
         OSError: the folder cannot be written.
     """
-    model = _new_model(run, Path(run.start) if run.start else None)
-    start_run(run, folder)
+    training_seeds(run.seed, run.agent.rows)
+    if run.agent.pretraining is None or run.start:
+        model = _new_model(run, Path(run.start) if run.start else None)
+        start_run(run, folder)
+    else:
+        start_run(run, folder)
+        model = _new_model(run, _pretrained(run, folder))
     return _learn(model, run, folder, None, time_limit_s)
 
 
@@ -70,11 +79,26 @@ def resume(folder: Path, time_limit_s: float = math.inf) -> Outcome:
         OSError: the folder cannot be written.
     """
     run = load_run(folder)
-    model = _new_model(run, folder / START if run.start else None)
+    model = _new_model(run, _pretrained(run, folder) if run.agent.pretraining or run.start else None)
     state = load_checkpoint(folder / CHECKPOINT) if (folder / CHECKPOINT).exists() else None
     if state is not None:
         restore(model, state)
     return _learn(model, run, folder, state, time_limit_s)
+
+
+def _pretrained(run: Run, folder: Path) -> Path:
+    """The actor in a run's folder that it starts from; made, if it is not there yet."""
+    path, agent = folder / START, run.agent
+    if agent.pretraining is not None and not path.exists():
+        torch.set_num_threads(run.threads)
+        functions = Functions(
+            agent.network.activation, SQUASH_OF[run.algorithm], agent.throttle_power, agent.magnification
+        )
+        actor = pretrain(
+            agent.pretraining, agent.network, functions, run.scenario, run.seed, run.validation_episodes, tqdm.write
+        )
+        write_files(folder, {START: to_bytes(actor)})
+    return path
 
 
 def _new_model(run: Run, start: Path | None) -> BaseAlgorithm:

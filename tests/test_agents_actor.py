@@ -103,7 +103,7 @@ def test_a_file_gives_the_same_actor(widths: tuple[int, ...], scenario: Scenario
     np.testing.assert_array_equal(again.predict(observations(9))[0], actor.predict(observations(9))[0])
 
 
-GOOD = {"activation": "tanh", "squash": "clip", "throttle_power": "3.0"}
+GOOD = {"activation": "tanh", "squash": "clip", "throttle_power": "3.0", "magnification": "50.0"}
 WEIGHT, BIAS = np.zeros((3, SIZE), np.float32), np.zeros(3, np.float32)
 LAYER = {"layers.0.weight": WEIGHT, "layers.0.bias": BIAS}
 

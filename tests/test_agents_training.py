@@ -179,12 +179,12 @@ def assert_refused(arguments: list[str], fault: str) -> None:
     assert result.stderr.count("\n") == 1
 
 
-def random_actor(squash: str, activation: str = "tanh", power: float = 3.0, width: int = 8) -> Actor:
+def random_actor(squash: str, activation: str = "tanh", power: float = 2.0, width: int = 8) -> Actor:
     """An actor of the size of `small_run`'s networks, with thrusts on all axes."""
     rng = np.random.default_rng(5)
     shapes = ((width, SIZE), (3, width))
     layers = [tuple(rng.normal(0, 0.3, size).astype(np.float32) for size in (shape, shape[:1])) for shape in shapes]
-    return Actor(layers, Functions(activation, squash, power), load_scenario("keeping"))
+    return Actor(layers, Functions(activation, squash, power, 50.0), load_scenario("keeping"))
 
 
 @pytest.mark.parametrize(
@@ -210,8 +210,8 @@ def test_a_start_flies_as_the_file_says(
     observations = np.random.default_rng(0).normal(0, 1, (50, SIZE)).astype(np.float32)
     expected = given.predict(observations)[0]
     z = started.predict(observations, deterministic=True)[0]
-    np.testing.assert_allclose(np.sign(z) * np.abs(z) ** 3, expected, rtol=0, atol=3e-6)  # float32 sums
-    np.testing.assert_array_equal(actor_of(started, 3.0, run.scenario).predict(observations)[0], expected)
+    np.testing.assert_allclose(np.sign(z) * np.abs(z) ** 2, expected, rtol=0, atol=3e-6)  # float32 sums
+    np.testing.assert_array_equal(actor_of(started, 2.0, run.scenario).predict(observations)[0], expected)
     actor_parts = ("policy_net", "action_net", "actor.latent_pi", "actor.mu")
     for name, tensor in started.policy.state_dict().items():
         assert torch.equal(tensor, fresh.policy.state_dict()[name]) != any(part in name for part in actor_parts), name
@@ -226,7 +226,7 @@ def test_a_start_flies_as_the_file_says(
             "activation: must be tanh",
         ),
         (random_actor("tanh"), "squash: must be clip"),
-        (random_actor("clip", power=2.0), "throttle_power: must be 3.0"),
+        (random_actor("clip", power=3.0), "throttle_power: must be 2.0"),
         (None, "cannot be read"),
     ],
 )
