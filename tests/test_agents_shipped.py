@@ -117,6 +117,7 @@ def test_the_run_best_on_validation_is_shipped(runs: list[Path], exported: Path)
     chosen = load_best(runs[best])[1]
     flown = evaluate(chosen, ENV, seeds("validation", 500))["return"].mean()
     assert costs[best] == pytest.approx(-flown, rel=1e-6)
+    assert [run.steps for run in card.runs] == [256, 256]
     one, two = (run.test_cost_m_s.mean for run in card.runs)
     over = card.cost_over_runs_m_s
     assert over is not None
