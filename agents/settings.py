@@ -58,8 +58,9 @@ class CommonSettings:
         throttle_power: p of the thrust sign(z) |z|^p that the network's output z stands for, in units of the greatest.
         log_std_init: natural logarithm of the first exploration noise, of the throttle. Noise costs fuel, so it
             starts low.
-        use_sde: whether the noise depends on the state (gSDE, Raffin et al. 2022), drawn once for a rollout.
-        sde_sample_freq: steps after which that noise is drawn anew; -1 is never.
+        use_sde: whether the noise depends on the state (gSDE, Raffin et al. 2022); PPO draws it once for a rollout, SAC
+            at each step.
+        sde_sample_freq: steps after which that noise is drawn anew within a rollout; -1 is never.
         reward_scale: rewards are multiplied by this, per m/s.
         normalise_reward: whether they are then divided by the running deviation of the discounted returns.
         shaping_weight: of the potential minus the predicted miss at arrival, (m/s) per m; see `agents.shaping`.
@@ -133,7 +134,7 @@ class SACSettings(CommonSettings):
     Attributes:
         gradient_steps: updates after each step of all rows.
         batch_size: samples of an update.
-        buffer_size: transitions remembered.
+        buffer_size: transitions remembered; those there are stand in the checkpoint, too, at 330 bytes each.
         learning_starts: steps flown before the first update: at random, or by the actor that the run starts from.
         learning_rate: of actor, critics and temperature.
         tau: share by which the target critics follow in each update.
