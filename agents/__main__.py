@@ -161,7 +161,9 @@ def evaluate(
     bound_episodes: Annotated[int, typer.Option(min=0, help="Of these, seeds held against the bound; 0 is none.")] = 20,
     bounds: Annotated[Path, typer.Option(help="Folder that keeps the bounds.")] = Path("reports/bounds"),
     allow_pickle: Annotated[bool, typer.Option("--allow-pickle", help="Load a .zip, which may run any code.")] = False,
-    throttle_power: Annotated[float | None, typer.Option(help="p, if a .zip's actions z mean sign(z)|z|^p.")] = None,
+    throttle_power: Annotated[
+        float | None, typer.Option(min=0.01, help="p, if a .zip's actions z mean sign(z)|z|^p; else they are thrusts.")
+    ] = None,
 ) -> None:
     """Fly a policy on the test seeds: mean and 95 % interval of each metric, and cost over the bound."""
     with _plain_errors():
@@ -170,6 +172,8 @@ def evaluate(
         if allow_pickle and source.suffix == ".zip":
             typer.echo(f"warning: {source}: what it holds pickled is being run", err=True)
         policy, scenario = choose(source, env, allow_pickle, throttle_power)
+        if getattr(policy, "scenario", scenario) != scenario:
+            typer.echo(f"note: {source} was trained on another scenario than {env}", err=True)
         typer.echo(score(policy, scenario, episodes, bound_episodes, bounds).to_string(float_format="{:.4g}".format))
 
 

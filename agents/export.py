@@ -91,12 +91,13 @@ def _examine(folder: Path, run: Run, actor: Actor) -> Candidate:
     """Fly a policy on the validation and on the test seeds."""
     from agents.curve import read_curve
 
+    last = read_curve(folder).iloc[-1]
     validation = evaluate(actor, run.scenario, seeds("validation", VALIDATION_EPISODES))
     episodes = evaluate(actor, run.scenario, seeds("test", TEST_EPISODES))
     trained = Trained(
         seed=run.seed,
-        steps=run.steps,
-        wall_time_s=float(read_curve(folder)["seconds"].iloc[-1]),
+        steps=int(last["steps"]),
+        wall_time_s=float(last["seconds"]),
         validation_cost_m_s=-float(validation["return"].mean()),
         test_cost_m_s=_cost(episodes),
     )

@@ -40,7 +40,7 @@ class Trained:
 
     Attributes:
         seed: of the training.
-        steps: environment steps.
+        steps: environment steps flown.
         wall_time_s: of the training, s.
         validation_cost_m_s: mean cost on the validation seeds, by which the shipped run was chosen, m/s.
         test_cost_m_s: cost on the test seeds, m/s; nothing was chosen by it.

@@ -1,7 +1,9 @@
 """Work that can be sent to other processes, and how it is done on all cores."""
 
 import multiprocessing
+import os
 import signal
+import threading
 from collections.abc import Callable, Hashable, Mapping
 from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from multiprocessing.sharedctypes import Synchronized
@@ -116,6 +118,15 @@ def _begin(counter: "Synchronized[int]") -> None:
     global _counter
     _counter = counter
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_follow, daemon=True).start()
+
+
+def _follow() -> None:
+    """End this worker process when the main one is gone: killed, it cannot say so, and this would wait for ever."""
+    main = multiprocessing.parent_process()
+    assert main is not None, "a worker has one"
+    main.join()
+    os._exit(1)
 
 
 def _fly(job: Work) -> Any:

@@ -5,7 +5,7 @@ import io
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Final, Protocol
 from zipfile import BadZipFile
 
 import numpy as np
@@ -14,6 +14,9 @@ import pandas as pd
 import formation_env
 from baselines.jobs import Name, Progress, Work
 from formation_env.files import replacing
+
+FOLDER: Final = "flown"
+"""Where finished flights are kept, inside the folder of a report."""
 
 
 class Tabled(Work, Protocol):

@@ -34,7 +34,8 @@ class MPCSettings:
         price_scale: factor of the scenario's price of errors.
         error_scatter: factor of how far errors are expected to scatter about the plan.
         thrust_scatter: the same for the thrust.
-        arrival_price: extra price of the position error at the arrivals, (m/s) per m.
+        arrival_price: extra price of the position error at the arrivals, (m/s) per m. From some price on, 1 in the
+            shipped scenarios, the arrival is a constraint: exact, where the thrust suffices, else as near as it gets.
     """
 
     horizon_periods: Positive = 1.0

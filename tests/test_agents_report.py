@@ -233,6 +233,15 @@ def test_a_shipped_file_is_evaluated_against_the_bound(policies: Path, tmp_path:
     assert len(list((tmp_path / "bounds").iterdir())) == 1
 
 
+def test_flying_elsewhere_is_noted(policies: Path) -> None:
+    """A policy may be scored on a scenario that it was not trained on, but not by mistake."""
+    options = ["--episodes", EPISODES, "--bound-episodes", 0, "--env"]
+    for env, noted in (("bad_communication", True), (KEEPING, False)):
+        result = run("evaluate", policies / f"ppo_keeping{TENSORS}", *options, env)
+        assert result.exit_code == 0, result.output
+        assert ("was trained on another scenario than" in result.stderr) == noted
+
+
 def foreign_model(folder: Path) -> Path:
     """A model of another environment."""
     PPO("MlpPolicy", "CartPole-v1", device="cpu").save(folder / "cartpole.zip")

@@ -205,3 +205,25 @@ def test_shared_prices_are_exact_for_errors_on_a_line() -> None:
             assert (shares * line[1:])[nodes[1:] > 31].sum() == pytest.approx(moment, rel=1e-12)
         else:
             assert (shares * line[1:])[nodes[1:] <= 30].sum() == pytest.approx(moment, rel=1e-12)
+
+
+def test_a_price_on_the_arrival_makes_it_a_constraint() -> None:
+    """An exact penalty: above the multiplier the plan is at the target on arrival, which it passes 100 m off without.
+
+    And where the limit forbids it, there is still a plan, as near as full thrust comes.
+    """
+    scenario = quiet("initialization")
+    (leg,), start = legs(scenario), scenario.start.formation.state(scenario.orbit)
+    target = leg_reference(scenario, leg, np.array([leg.arrival]))[0, :3]
+
+    def miss_m(price: float, scenario: Scenario = scenario) -> float:
+        plan = MPC(scenario, dataclasses.replace(EVERY_STEP, arrival_price=price)).program(0).solve(start)
+        assert plan.solved
+        return float(np.linalg.norm(plan.states[leg.arrival - 1, :3] - target))
+
+    free = miss_m(0.0)
+    assert free > 50
+    # the solver's gap of 1e-6 of a plan of 1 m/s, at 1 m/s per m
+    assert miss_m(1.0) < 1e-3
+    weak = dataclasses.replace(scenario, spacecraft=dataclasses.replace(scenario.spacecraft, max_accel_m_s2=2e-4))
+    assert 1 < miss_m(1.0, weak) < miss_m(0.0, weak)

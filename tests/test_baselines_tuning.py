@@ -15,13 +15,13 @@ from baselines.side_by_side import SideBySide
 from baselines.tuning import study
 from baselines.tuning.command import task
 from baselines.tuning.gain_file import replace_section
-from baselines.tuning.knobs import KNOBS, first_gains, knobs_for, read, turn
+from baselines.tuning.knobs import KNOBS, first_gains, knobs_for, present_gains, read, turn
 from baselines.tuning.study import Task, costs, open_study, search
 from formation_env import evaluation, load_scenario
 from formation_env.dynamics.base import Array
 from formation_env.evaluation import evaluate
 from formation_env.seeds import seeds
-from formation_env.settings import ConfigError, build
+from formation_env.settings import ConfigError, build, load_yaml
 
 BOTTOM = {"expected_cost.floor": 7e-4, "expected_cost.price_scale": 0.6, "deadband": 0.3}
 """Where the bowl has its least value, 0."""
@@ -165,6 +165,25 @@ def test_command_writes_gains_that_load_and_are_no_worse(tmp_path: Path) -> None
     assert journal.name == "keeping_smc.journal"
 
 
+def test_slow_policies_have_a_budget_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One command searches all of them, each with its number of trials and of seeds, and the file says which."""
+    flown = list[tuple[str, int, int]]()
+
+    def costs(self: Task, batch: list[dict[str, float]]) -> Array:
+        flown.append((self.policy, len(self.episode_seeds), len(batch)))
+        return np.arange(len(batch), dtype=float)
+
+    monkeypatch.setattr(Task, "costs", costs)
+    budget = ("--trials", 6, "--episodes", 5, "--slow-trials", 3, "--slow-episodes", 2)
+    folders = ("--out", tmp_path, "--studies", tmp_path / "studies")
+    result = tune("keeping", "--policy", "smc", "--policy", "mpc", *budget, *folders)
+    assert result.exit_code == 0, result.output
+    assert flown == [("smc", 5, 6), ("mpc", 2, 3)]
+    text = (tmp_path / "keeping.yaml").read_text()
+    assert "tune keeping --policy mpc --slow-trials 3 --slow-episodes 2\n" in text
+    assert "tune keeping --policy smc --trials 6 --episodes 5\n" in text
+
+
 def test_interrupt_ends_in_one_line_and_keeps_the_trials(
     lqr: Task, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -244,3 +263,18 @@ def test_without_optuna_the_extra_is_named(lqr: Task, tmp_path: Path, monkeypatc
     result = tune("keeping", "--policy", "lqr", "--out", tmp_path, "--studies", tmp_path)
     assert result.exit_code == 1
     assert result.stderr.splitlines() == ["tune: needs optuna; install it with: pip install 'formation-env[optimal]'"]
+
+
+def test_gains_in_use_are_tried_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file whose gains are the bowl's bottom keeps them, whatever the other trials; a limit of a knob is kept to."""
+    monkeypatch.setattr(Task, "costs", bowl)
+    path = tmp_path / "keeping.yaml"
+    path.write_text("lqr: {deadband: 0.3, expected_cost: {floor: 7e-4, price_scale: 0.6}}\n")
+    folders = ("--out", tmp_path, "--studies", tmp_path / "studies")
+    result = tune("keeping", "--policy", "lqr", "--trials", 12, *folders)
+    assert result.exit_code == 0, result.output
+    assert "(trial 1; " in result.output
+    assert read(load_yaml(path)["lqr"], KNOBS["lqr"]) == BOTTOM
+    path.write_text("lqr: {deadband: 0.3, expected_cost: {floor: 1e-9, price_scale: 0.6}}\n")
+    assert present_gains("lqr", path, KNOBS["lqr"]) == {**BOTTOM, "expected_cost.floor": 1e-5}
+    assert present_gains("lqr", tmp_path / "none.yaml", KNOBS["lqr"]) is None

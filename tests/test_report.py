@@ -216,7 +216,7 @@ def test_fronts_and_robustness_are_in_the_report(folder: Path) -> None:
 def test_no_front_where_none_is_possible(tmp_path: Path) -> None:
     """An error without a price has no front; the report says so, and is written all the same."""
     free = build(Scenario, SHORT | {"reward": {"error_weight": 0.0}}, "test")
-    page = write_report({"random": random}, [free], Wanted(2, unswept=()), tmp_path, COMMAND)
+    page = write_report({"random": random, "zero": zero}, [free], Wanted(2, unswept=()), tmp_path, COMMAND)
     assert "No front and no robustness: sweep: " in page.read_text(encoding="utf-8")
     assert "must be &gt; 0 for a front, got 0" in page.read_text(encoding="utf-8")
     assert len(pd.read_csv(tmp_path / "sweep.csv")) == 0

@@ -1,6 +1,11 @@
 """What was flown is kept as it finishes, and not flown again; times and tables survive as they were."""
 
+import contextlib
+import json
+import subprocess
+import sys
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -11,9 +16,9 @@ import pytest
 
 from baselines.factories import Classical
 from baselines.floors import Zero, ZeroSettings
-from baselines.kept import Kept, keep, path_of, read
-from baselines.report import Wanted, rounds
-from baselines.report.rounds import FLOWN, Found
+from baselines.kept import FOLDER, Kept, keep, path_of, read
+from baselines.report import Wanted, rounds, write_report
+from baselines.report.rounds import Found
 from baselines.report.work import ACTION_TIME, CHUNK, Episodes, Flight, episode_jobs
 from baselines.sweep.report import Wanted as WantedSweep
 from baselines.sweep.report import write_sweep
@@ -110,12 +115,82 @@ def test_what_was_interrupted_goes_on(tmp_path: Path) -> None:
     assert_equal(found, expected)
 
 
+@contextlib.contextmanager
+def started(*arguments: object) -> Iterator[subprocess.Popen[bytes]]:
+    """A Python process that is killed in the end."""
+    process = subprocess.Popen([sys.executable, *map(str, arguments)], stderr=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+def wait_until(what: Callable[[], bool]) -> None:
+    """Wait, for two minutes at most."""
+    end = time.monotonic() + 120
+    while not what():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def test_killed_it_goes_on(tmp_path: Path) -> None:
+    """SIGKILL in the second round leaves whole files, which another process finds under the same names and uses."""
+    env, out = tmp_path / "short.yaml", tmp_path / "out"
+    env.write_text(json.dumps(SHORT))
+    arguments = ["--env", env, "--policy", "lqr", "--out", out, "--episodes", 2, "--sweep-episodes", 2]
+    arguments += ["--bound-episodes", 0, "--resume", "--processes", 1]
+    with started("-m", "baselines", "report", *arguments):
+        wait_until(lambda: len(list(out.glob(f"{FOLDER}/point_*.npz"))) >= 2)
+    kept = {path: path.stat().st_mtime_ns for path in out.glob(f"{FOLDER}/[a-z]*.npz")}
+    assert not (out / "report.html").exists()
+    wanted = Wanted(2, sweep_episodes=2, sweep_bound_episodes=0, resume=True)
+    write_report({"lqr": Classical("lqr")}, [env], wanted, out, COMMAND)
+    assert {path: path.stat().st_mtime_ns for path in kept} == kept
+    assert len(list(out.glob(f"{FOLDER}/[a-z]*.npz"))) > len(kept)
+
+
+SLEEPER = """
+import sys, time
+from pathlib import Path
+from baselines.jobs import run
+
+class Sleeper:
+    cost = 1
+
+    def fly(self, progress):
+        Path(sys.argv[1]).touch()
+        time.sleep(600)
+
+if __name__ == "__main__":
+    run({"sleep": Sleeper()}, lambda cost: None, 2)
+"""
+
+
+def test_a_killed_main_process_leaves_no_worker(tmp_path: Path) -> None:
+    """Nobody would ever tell a worker that there is no more to do."""
+    script, begun = tmp_path / "sleeper.py", tmp_path / "begun"
+    script.write_text(SLEEPER)
+    with started(script, begun) as process:
+        wait_until(begun.exists)
+        workers = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+        assert workers
+    wait_until(lambda: not any(is_running(worker) for worker in workers))
+
+
+def is_running(pid: str) -> bool:
+    """Whether a process is there and no zombie, which only waits for somebody to ask how it ended."""
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    return False
+
+
 def test_nothing_old_is_used_unasked(tmp_path: Path) -> None:
     """Without --resume, with other settings, or with a damaged file it is flown."""
     first, _ = fly(tmp_path, Coast({"gain": 1.0}))
     assert fly(tmp_path, Coast({"gain": 2.0}))[0] == first
     assert fly(tmp_path, Coast({"gain": 1.0}), replace(WANTED, resume=False))[0] == first
-    for path in (tmp_path / FLOWN).iterdir():
+    for path in (tmp_path / FOLDER).iterdir():
         path.write_text("")
     assert fly(tmp_path, Coast({"gain": 1.0}))[0] == first
 

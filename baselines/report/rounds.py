@@ -4,14 +4,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from baselines import jobs
 from baselines.factories import PolicyFactory
-from baselines.kept import keep
+from baselines.kept import FOLDER, keep
 from baselines.report.bounds import SOLVER, Bounds, bound_jobs
 from baselines.report.flights import Flown, flight_jobs, join_episodes, join_flights
 from baselines.report.wanted import Wanted
@@ -21,9 +21,6 @@ from formation_env.dynamics.base import Array
 from formation_env.scenario import Scenario
 from formation_env.seeds import seeds
 from formation_env.settings import ConfigError
-
-FLOWN: Final = "flown"
-"""Where finished flights are kept, inside the report's folder."""
 
 Scenarios = Mapping[str, Scenario]
 Policies = Mapping[str, PolicyFactory]
@@ -60,7 +57,7 @@ def fly(policies: Policies, scenarios: Scenarios, wanted: Wanted, out: Path, wor
         RuntimeError: the bound's solver failed.
         OSError: the folder cannot be written.
     """
-    folder, all_seeds = out / FLOWN if wanted.resume else None, seeds("test", wanted.episodes)
+    folder, all_seeds = out / FOLDER if wanted.resume else None, seeds("test", wanted.episodes)
     slow = dict.fromkeys(wanted.slow, wanted.slow_episodes)
     flights = {}
     for env, scenario in scenarios.items():

@@ -35,9 +35,10 @@ def _rival(results: Results, name: str, role: str) -> str:
     """How far behind the best a policy is."""
     behind = results.behind(results.best, name)
     mean, low, high = numbers(behind)
-    percent = number(100 * behind[0] / results.cost(results.best)[0])
+    cost = results.cost(results.best)[0]
+    share = f" ({number(100 * behind[0] / cost)} %)" if cost > 0 else ""
     verdict = "significant" if significant(behind) else "not significant"
-    return f"{role} {name}, {mean} [{low}, {high}] m/s ({percent} %) behind on the same seeds, which is {verdict}"
+    return f"{role} {name}, {mean} [{low}, {high}] m/s{share} behind on the same seeds, which is {verdict}"
 
 
 def reading(results: Results) -> list[str]:

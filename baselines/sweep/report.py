@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from baselines import jobs
 from baselines.factories import PolicyFactory
-from baselines.kept import keep
+from baselines.kept import FOLDER, keep
 from baselines.report.document import to_json, versions
 from baselines.report.flights import Environment, name_environments
 from baselines.sweep.flights import Sweep, points
@@ -19,8 +19,6 @@ from formation_env.scenario import Scenario
 from formation_env.seeds import seeds as seeds_of
 
 FILES: Final = ("sweep.csv", "sweep.json", "sweep.html")
-FLOWN: Final = "flown"
-"""Where finished flights are kept, inside the sweep's folder."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +67,7 @@ def write_sweep(
     work = points(scenarios, policies, seeds, wanted.bound_episodes)
     if any(job.bound_seeds for job in work.values()):
         import_module("clarabel")  # that it is missing should be known before the flights, not after
-    found = jobs.fly(keep(work, out / FLOWN if wanted.resume else None), workers)
+    found = jobs.fly(keep(work, out / FOLDER if wanted.resume else None), workers)
     sweep = Sweep.join([found[name] for name in work], {})
     data = document(scenarios, sweep, seeds, wanted, command)
     contents = (sweep.episodes.to_csv(index=False), to_json(data), render(scenarios, sweep, data))

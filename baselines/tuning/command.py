@@ -5,8 +5,9 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from baselines.registry import SLOW
 from baselines.tuning.gain_file import write_section
-from baselines.tuning.knobs import KNOBS, first_gains, knobs_for
+from baselines.tuning.knobs import KNOBS, first_gains, knobs_for, present_gains
 from baselines.tuning.study import Task, search
 from formation_env.scenario import config_folder, load_scenario, scenario_names
 from formation_env.seeds import seeds
@@ -18,6 +19,8 @@ def tune(
     policy: Annotated[list[str] | None, typer.Option(help=f"{', '.join(KNOBS)}; may be repeated; all.")] = None,
     trials: Annotated[int, typer.Option(min=1, help="Of each policy in each scenario.")] = 200,
     episodes: Annotated[int, typer.Option(min=2, max=1_000_000, help="Tuning seeds that each trial flies.")] = 64,
+    slow_trials: Annotated[int, typer.Option(min=1, help=f"Trials of {', '.join(SLOW)}.")] = 20,
+    slow_episodes: Annotated[int, typer.Option(min=2, max=1_000_000, help="Tuning seeds of theirs.")] = 8,
     out: Annotated[
         Path | None, typer.Option(file_okay=False, help="Folder of the gain files; configs/baselines.")
     ] = None,
@@ -25,14 +28,18 @@ def tune(
         Path, typer.Option(file_okay=False, help="Folder of the studies, which are gone on with.")
     ] = Path("runs/tuning"),
 ) -> None:
-    """Search the gains of policies and write them to configs/baselines/SCENARIO.yaml."""
+    """Search the gains of policies and write them to configs/baselines/SCENARIO.yaml.
+
+    The same budget for all but those that solve a program at each step, whose trials take a hundred times as long.
+    """
     names = scenarios or [name for name in scenario_names() if not name.startswith("thesis")]
+    chosen, folder = policy or list(KNOBS), out or config_folder("baselines")
     try:
-        tasks = {(name, each): task(each, name, episodes) for each in policy or KNOBS for name in names}
+        flown = {each: slow_episodes if each in SLOW else episodes for each in chosen}
+        tasks = {(name, each): task(each, name, flown[each]) for each in chosen for name in names}
         for (name, each), wanted in tasks.items():
-            _tune_one(
-                wanted, name, trials, out or config_folder("baselines"), studies / f"{Path(name).stem}_{each}.journal"
-            )
+            budget = slow_trials if each in SLOW else trials
+            _tune_one(wanted, name, budget, folder, studies / f"{Path(name).stem}_{each}.journal")
     except ConfigError as error:
         _end(f"tune: {error}", 2)
     except KeyboardInterrupt:
@@ -57,13 +64,17 @@ def task(policy: str, name: str, episodes: int) -> Task:
 
 def _tune_one(wanted: Task, name: str, trials: int, folder: Path, journal: Path) -> None:
     """Search, write, and tell."""
+    path = folder / f"{Path(name).stem}.yaml"
+    present = present_gains(wanted.policy, path, wanted.knobs)
     with typer.progressbar(length=trials, label=f"{name} {wanted.policy}") as bar:
-        found = search(wanted, trials, journal, bar.update)
+        found = search(wanted, trials, journal, bar.update, present)
     count, flown = len(wanted.episode_seeds), wanted.episode_seeds
     summary = f"mean cost {found.cost:.4f} m/s (trial {found.trial}; first gains {found.first_cost:.4f} m/s)"
-    command = f"python -m baselines tune {name} --policy {wanted.policy} --trials {trials} --episodes {count}"
+    slow = "slow-" if wanted.policy in SLOW else ""
+    budget = f"--{slow}trials {trials} --{slow}episodes {count}"
+    command = f"python -m baselines tune {name} --policy {wanted.policy} {budget}"
     comment = f"{command}\nseeds {flown[0]} to {flown[-1]}, {summary}"
-    write_section(folder / f"{Path(name).stem}.yaml", wanted.policy, found.gains, comment)
+    write_section(path, wanted.policy, found.gains, comment)
     typer.echo(f"{name} {wanted.policy}: {summary}")
 
 

@@ -3,6 +3,7 @@
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Final
 
 from baselines.registry import read_gains
@@ -92,6 +93,22 @@ def first_gains(policy: str) -> dict[str, Any]:
     read_gains(policy, path)  # refuses what is wrong in it
     section: dict[str, Any] = load_yaml(path)[policy]
     return section
+
+
+def present_gains(policy: str, path: Path, knobs: Sequence[Knob]) -> dict[str, float] | None:
+    """Where the knobs stand in a gain file, cut to their limits; None if it does not say.
+
+    Raises:
+        ConfigError: the file is faulty.
+    """
+    if not path.is_file():
+        return None
+    read_gains(policy, path)
+    try:
+        values = read(load_yaml(path).get(policy, {}), knobs)
+    except (KeyError, IndexError, TypeError):
+        return None
+    return {knob.name: min(max(values[knob.name], knob.low), knob.high) for knob in knobs}
 
 
 def turn(gains: dict[str, Any], knobs: Sequence[Knob], values: Mapping[str, float]) -> dict[str, Any]:

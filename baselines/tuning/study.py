@@ -89,7 +89,13 @@ def costs(policies: Sequence[Policy], scenario: Scenario, episode_seeds: Sequenc
     return per_policy
 
 
-def search(task: Task, trials: int, journal: Path, progress: Callable[[int], Any] = lambda count: None) -> Found:
+def search(
+    task: Task,
+    trials: int,
+    journal: Path,
+    progress: Callable[[int], Any] = lambda count: None,
+    present: dict[str, float] | None = None,
+) -> Found:
     """The best of a number of trials; those that the journal has are not flown again.
 
     Args:
@@ -97,6 +103,7 @@ def search(task: Task, trials: int, journal: Path, progress: Callable[[int], Any
         trials: how many, with the first gains as trial 0.
         journal: file of the study; made if it does not exist, and added to after each batch.
         progress: called with the number of trials that have just become known.
+        present: where the knobs stand in the gains used up to now; a new study has them as trial 1.
 
     Raises:
         ConfigError: the file is no journal.
@@ -108,7 +115,7 @@ def search(task: Task, trials: int, journal: Path, progress: Callable[[int], Any
     progress(len(known))
     while len(known) < trials:
         first = len(known) // BATCH * BATCH
-        batch = candidates(task, known[:first])[len(known) - first : trials - first]
+        batch = candidates(task, known[:first], present)[len(known) - first : trials - first]
         add(study, task.knobs, batch, task.costs(batch))
         known = study.get_trials(deepcopy=False)[:trials]
         progress(len(batch))
@@ -117,8 +124,10 @@ def search(task: Task, trials: int, journal: Path, progress: Callable[[int], Any
     return Found(turn(task.gains, task.knobs, best.params), min(values), values[0], best.number)
 
 
-def candidates(task: Task, before: Sequence["FrozenTrial"]) -> list[dict[str, float]]:
-    """The batch of candidates that follows the trials of the batches before."""
+def candidates(
+    task: Task, before: Sequence["FrozenTrial"], present: dict[str, float] | None = None
+) -> list[dict[str, float]]:
+    """The batch of candidates that follows the trials of the batches before; the first has what is known already."""
     from optuna import create_study
     from optuna.samplers import TPESampler
 
@@ -126,7 +135,8 @@ def candidates(task: Task, before: Sequence["FrozenTrial"]) -> list[dict[str, fl
     study = create_study(sampler=TPESampler(seed=len(before), multivariate=True, constant_liar=True))
     study.add_trials(before)
     if not before:
-        study.enqueue_trial(read(task.gains, task.knobs))
+        for known in filter(None, (read(task.gains, task.knobs), present)):
+            study.enqueue_trial(known, skip_if_exists=True)
     return [study.ask(_distributions(task.knobs)).params for _ in range(BATCH)]
 
 
