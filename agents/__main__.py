@@ -1,6 +1,7 @@
 """Train policies, draw their learning curves, and report on them beside the classical ones."""
 
 import contextlib
+import math
 import shlex
 import sys
 from collections.abc import Iterator
@@ -9,6 +10,20 @@ from typing import Annotated
 
 import typer
 
+from agents.shipped import SHIPPED
+from baselines.commands import (
+    PROCESSES,
+    BoundEpisodes,
+    Envs,
+    Episodes,
+    Fine,
+    Out,
+    Processes,
+    Resume,
+    SlowEpisodes,
+    SweepEpisodes,
+    run_report,
+)
 from formation_env.settings import ConfigError
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
@@ -42,27 +57,74 @@ def _command() -> str:
 
 @app.command()
 def train(
-    algorithm: Annotated[str, typer.Argument(help="ppo or sac.")],
-    env: Annotated[str, typer.Argument(help="A registered id, or a scenario's name or YAML file.")],
-    steps: Annotated[int, typer.Option(min=1, help="Environment steps to train for.")],
-    out: Annotated[Path, typer.Option(help="Folder of the run; must not hold one yet.")],
-    seed: Annotated[int, typer.Option(min=0, help="Of the network, the exploration and the episodes.")] = 0,
-    rows: Annotated[int | None, typer.Option(min=1, help="Environments side by side; else as in the file.")] = None,
+    context: typer.Context,
+    algorithm: Annotated[str | None, typer.Argument(help="ppo or sac.")] = None,
+    env: Annotated[str | None, typer.Argument(help="A registered id, or a scenario's name or YAML file.")] = None,
     config: Annotated[Path | None, typer.Option(help="Hyperparameters; else configs/agents/ALGORITHM.yaml.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the network, the exploration and the episodes.")] = 0,
+    steps: Annotated[int | None, typer.Option(min=1, help="Environment steps; else as in the file.")] = None,
+    out: Annotated[Path | None, typer.Option(help="New folder of the run; else runs/ALGORITHM_ENV_seedN.")] = None,
+    start: Annotated[Path | None, typer.Option(help="Actor (.safetensors) to start from, not random weights.")] = None,
+    resume: Annotated[Path | None, typer.Option(help="Folder of a run to go on with; all else is as it was.")] = None,
+    time_limit: Annotated[float, typer.Option(min=0, help="Minutes after which to save and stop.")] = math.inf,
+    rows: Annotated[int | None, typer.Option(min=1, help="Environments side by side; else as in the file.")] = None,
     validations: Annotated[int, typer.Option(min=1, help="Validations over the run.")] = 20,
     validation_episodes: Annotated[int, typer.Option(min=2, help="Episodes of each validation.")] = 64,
-    threads: Annotated[int, typer.Option(min=1, help="Threads of torch; more help only on an idle machine.")] = 1,
+    threads: Annotated[int, typer.Option(min=1, help="Threads of torch; more help on an idle machine only.")] = 1,
 ) -> None:
-    """Train a policy; keep the best on the validation seeds. Ctrl-C saves and ends."""
+    """Train a policy; keep the best on the validation seeds. Ctrl-C saves and ends; --resume FOLDER goes on."""
     with _plain_errors():
-        from agents.plan import plan_run
+        from agents.plan import default_folder, plan_run
+        from agents.train import resume as resume_run
         from agents.train import train as train_run
 
-        run = plan_run(algorithm, env, steps, seed, rows, config, validations, validation_episodes, threads, _command())
-        if not train_run(run, out):
-            typer.echo(f"interrupted; what was learnt up to now is in {out}", err=True)
-            raise typer.Exit(INTERRUPTED)
-        typer.echo(f"the best model is {out / 'model.zip'}, its learning curve {out / 'validation.csv'}")
+        if resume is not None:
+            _check_alone(context, resume)
+            _tell_end(resume_run(resume, 60 * time_limit), resume)
+            return
+        if algorithm is None or env is None:
+            raise ConfigError("train: give an algorithm and an environment, or --resume FOLDER")
+        run = plan_run(
+            algorithm, env, steps, seed, rows, config, validations, validation_episodes, threads, start, _command()
+        )
+        folder = out or default_folder(run)
+        _tell_end(train_run(run, folder, 60 * time_limit), folder)
+
+
+def _check_alone(context: typer.Context, folder: Path) -> None:
+    """Refuse what is given beside --resume and would make it another run."""
+    from agents.runs import load_run
+
+    run = load_run(folder)
+    for name, given in context.params.items():
+        source = context.get_parameter_source(name)
+        if name in ("resume", "time_limit") or source is None or source.name == "DEFAULT":
+            continue
+        if name not in ("algorithm", "env") or given != getattr(run, name):
+            raise ConfigError(f"--resume: {folder} goes on as it began: {run.algorithm} {run.env}; leave out {name}")
+
+
+def _tell_end(outcome: str, folder: Path) -> None:
+    """Say how a training ended, and what is to be done then."""
+    if outcome == "finished":
+        typer.echo(f"the best policy is {folder / 'best.safetensors'}, its learning curve {folder / 'validation.csv'}")
+        return
+    typer.echo(f"{outcome}; go on with: python -m agents train --resume {shlex.quote(str(folder))}", err=True)
+    if outcome == "interrupted":
+        raise typer.Exit(INTERRUPTED)
+
+
+@app.command()
+def bench(
+    env: Annotated[str, typer.Argument(help="A registered id, or a scenario.")] = "FormationKeeping-v0",
+    threads: Annotated[list[int], typer.Option(min=1, help="Threads of torch.")] = [1, 2],  # noqa: B006
+    rounds: Annotated[int, typer.Option(min=1, help="Rollouts with their updates; the fastest counts.")] = 5,
+) -> None:
+    """Print how fast PPO learns with its default settings, and the environment's share of that time."""
+    with _plain_errors():
+        from agents.bench import table
+
+        typer.echo(f"PPO on {env}\n{table(env, threads, rounds)}")
 
 
 @app.command()
@@ -80,17 +142,64 @@ def curve(
 
 
 @app.command()
-def report(
-    model: Annotated[list[str], typer.Option(help="LABEL=FOLDER of a run; a label may have a run per scenario.")],
-    env: Annotated[list[str] | None, typer.Option(help="Environments; else those of the models.")] = None,
-    episodes: Annotated[int, typer.Option(min=1, help="Test episodes per environment.")] = 100,
-    out: Annotated[Path, typer.Option(help="Folder of the report.")] = Path("reports"),
+def export(
+    runs: Annotated[list[Path], typer.Argument(help="Folders of runs that differ in their training seeds.")],
+    out: Annotated[Path, typer.Option(help="Folder of the policy's files.")] = SHIPPED,
 ) -> None:
-    """Fly learned and classical policies on the same test seeds: tables and one HTML page."""
+    """Write the policy that is best on validation seeds: tensors, a card with all runs' test results, an ONNX graph."""
     with _plain_errors():
-        from agents.report import report_models
+        from agents.export import export as export_runs
 
-        typer.echo(report_models(model, env, episodes, out, _command()))
+        typer.echo(export_runs(runs, out))
+
+
+@app.command()
+def evaluate(
+    source: Annotated[Path, typer.Argument(help="A .safetensors file, a run's folder, or your own SB3 model (.zip).")],
+    env: Annotated[str | None, typer.Option(help="Where to fly; else where it was trained.")] = None,
+    episodes: Annotated[int, typer.Option(min=1, help="Test seeds.")] = 100,
+    bound_episodes: Annotated[int, typer.Option(min=0, help="Of these, seeds held against the bound; 0 is none.")] = 20,
+    bounds: Annotated[Path, typer.Option(help="Folder that keeps the bounds.")] = Path("reports/bounds"),
+    allow_pickle: Annotated[bool, typer.Option("--allow-pickle", help="Load a .zip, which may run any code.")] = False,
+    throttle_power: Annotated[
+        float | None, typer.Option(min=0.01, help="p, if a .zip's actions z mean sign(z)|z|^p; else they are thrusts.")
+    ] = None,
+) -> None:
+    """Fly a policy on the test seeds: mean and 95 % interval of each metric, and cost over the bound."""
+    with _plain_errors():
+        from agents.evaluate import choose, score
+
+        if allow_pickle and source.suffix == ".zip":
+            typer.echo(f"warning: {source}: what it holds pickled is being run", err=True)
+        policy, scenario = choose(source, env, allow_pickle, throttle_power)
+        if getattr(policy, "scenario", scenario) != scenario:
+            typer.echo(f"note: {source} was trained on another scenario than {env}", err=True)
+        typer.echo(score(policy, scenario, episodes, bound_episodes, bounds).to_string(float_format="{:.4g}".format))
+
+
+@app.command()
+def report(
+    model: Annotated[list[str] | None, typer.Option(help="LABEL=PATH, as of evaluate; else the shipped ones.")] = None,
+    env: Envs = None,
+    episodes: Episodes = 100,
+    slow_episodes: SlowEpisodes = 5,
+    sweep_episodes: SweepEpisodes = 10,
+    bound_episodes: BoundEpisodes = 2,
+    fine: Fine = False,
+    resume: Resume = False,
+    out: Out = Path("reports"),
+    processes: Processes = PROCESSES,
+) -> None:
+    """Fly learned and classical policies on the same test seeds: tables, fronts and robustness on one HTML page."""
+
+    def write() -> Path:
+        from agents.report import report_models
+        from baselines.report import Wanted
+
+        wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, not fine, resume)
+        return report_models(model or [], env, wanted, out, _command(), processes)
+
+    run_report("report", out, write)
 
 
 if __name__ == "__main__":

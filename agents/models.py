@@ -1,17 +1,101 @@
-"""From hyperparameters to Stable-Baselines3's algorithms."""
+"""From hyperparameters to Stable-Baselines3's environments and algorithms."""
 
+import math
 from typing import Any, Final
 
+import torch
+from gymnasium import spaces
+from numpy.typing import NDArray
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.utils import LinearSchedule
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.noise import ActionNoise
+from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.common.utils import LinearSchedule, update_learning_rate
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from torch import nn
 
-from agents.settings import AgentSettings, Network, PPOSettings, SACSettings
+from agents.features import CUT, MAGNIFIED
+from agents.settings import AgentSettings, PPOSettings, SACSettings
+from agents.shaping import Shaping
+from agents.vec_env import Sb3VecEnv
+from formation_env.observation import SIZE
+from formation_env.scenario import Scenario
 
 CLASSES: Final[dict[str, type[BaseAlgorithm]]] = {"ppo": PPO, "sac": SAC}
 ACTIVATIONS: Final[dict[str, type[nn.Module]]] = {"tanh": nn.Tanh, "elu": nn.ELU, "relu": nn.ReLU}
+
+
+class Magnifier(BaseFeaturesExtractor):
+    """Shows a network an observation as `agents.features` does; nothing in it is learnt."""
+
+    def __init__(self, observation_space: spaces.Box, magnification: float) -> None:
+        super().__init__(observation_space, SIZE)
+        factors = torch.ones(SIZE)
+        factors[MAGNIFIED] = magnification
+        self.register_buffer("factors", factors, persistent=False)
+
+    def forward(self, observations: torch.Tensor) -> torch.Tensor:
+        """Features (rows, SIZE) of observations (rows, SIZE)."""
+        return (observations * self.factors).clamp(-CUT, CUT)
+
+
+class CriticFirstPPO(PPO):
+    """PPO whose first updates are the critic's alone, and whose exploration does not collapse.
+
+    Attributes:
+        warmup_steps: rollouts that end up to this step leave the actor as it is.
+        log_std_min: the logarithm of the noise does not fall below this.
+    """
+
+    warmup_steps: int = 0
+    log_std_min: float = -math.inf
+
+    def train(self) -> None:
+        """Update on the rollout just flown."""
+        policy = self.policy
+        for part in (*policy.mlp_extractor.policy_net.parameters(), *policy.action_net.parameters(), policy.log_std):
+            part.requires_grad_(self.num_timesteps > self.warmup_steps)
+        super().train()
+        with torch.no_grad():
+            policy.log_std.clamp_(min=self.log_std_min)
+
+
+class CriticFirstSAC(SAC):
+    """SAC whose first updates are the critics' alone, and which need not begin with random flights.
+
+    Attributes:
+        actor_delay_steps: up to this step actor and temperature stay as they are.
+        random_start: whether the steps before the first update are flown at random, and not by the actor.
+    """
+
+    actor_delay_steps: int = 0
+    random_start: bool = True
+
+    def _update_learning_rate(self, optimizers: list[torch.optim.Optimizer] | torch.optim.Optimizer) -> None:
+        super()._update_learning_rate(optimizers)
+        if self.num_timesteps <= self.actor_delay_steps:
+            for optimizer in (self.actor.optimizer, self.ent_coef_optimizer):
+                update_learning_rate(optimizer, 0.0)
+
+    def _sample_action(
+        self, learning_starts: int, action_noise: ActionNoise | None = None, n_envs: int = 1
+    ) -> tuple[NDArray[Any], NDArray[Any]]:
+        return super()._sample_action(learning_starts if self.random_start else 0, action_noise, n_envs)
+
+
+def make_env(agent: AgentSettings, scenario: Scenario) -> VecEnv:
+    """The environment to learn on."""
+    shaping = Shaping(scenario, agent.shaping_weight, agent.gamma) if agent.shaping_weight else None
+    env = Sb3VecEnv(
+        agent.rows,
+        scenario,
+        reward_scale=agent.reward_scale,
+        throttle_power=agent.throttle_power,
+        shaping=shaping,
+        bootstrap_end=agent.bootstrap_end,
+        stagger=True,
+    )
+    return VecNormalize(env, norm_obs=False, gamma=agent.gamma) if agent.normalise_reward else env
 
 
 def make_model(agent: AgentSettings, env: VecEnv, seed: int) -> BaseAlgorithm:
@@ -20,7 +104,7 @@ def make_model(agent: AgentSettings, env: VecEnv, seed: int) -> BaseAlgorithm:
 
 
 def _ppo(agent: PPOSettings, env: VecEnv, seed: int) -> PPO:
-    return PPO(
+    model = CriticFirstPPO(
         "MlpPolicy",
         env,
         n_steps=agent.rollout_steps,
@@ -30,17 +114,25 @@ def _ppo(agent: PPOSettings, env: VecEnv, seed: int) -> PPO:
         gamma=agent.gamma,
         gae_lambda=agent.gae_lambda,
         clip_range=agent.clip_range,
+        target_kl=agent.target_kl or None,
         ent_coef=agent.entropy_coef,
         vf_coef=agent.value_coef,
         max_grad_norm=agent.max_grad_norm,
-        policy_kwargs=_layers(agent.network) | {"log_std_init": agent.log_std_init},
+        use_sde=agent.use_sde,
+        sde_sample_freq=agent.sde_sample_freq,
+        policy_kwargs=_layers(agent) | {"log_std_init": agent.log_std_init},
         seed=seed,
         device="cpu",
     )
+    model.warmup_steps = agent.warmup_rollouts * agent.rollout_steps * agent.rows
+    model.log_std_min = agent.log_std_min
+    return model
 
 
 def _sac(agent: SACSettings, env: VecEnv, seed: int) -> SAC:
-    return SAC(
+    # SB3 cuts the mean of gSDE off at 2, which would be another actor than the one in the file.
+    own = {"log_std_init": agent.log_std_init, "clip_mean": 0.0}
+    model = CriticFirstSAC(
         "MlpPolicy",
         env,
         train_freq=1,
@@ -53,11 +145,23 @@ def _sac(agent: SACSettings, env: VecEnv, seed: int) -> SAC:
         tau=agent.tau,
         ent_coef=f"auto_{agent.entropy_init}",
         target_entropy=agent.target_entropy,
-        policy_kwargs=_layers(agent.network),
+        use_sde=agent.use_sde,
+        sde_sample_freq=agent.sde_sample_freq,
+        policy_kwargs=_layers(agent) | own,
         seed=seed,
         device="cpu",
     )
+    if not agent.use_sde:  # else SB3 does it
+        nn.init.zeros_(model.actor.log_std.weight)
+        nn.init.constant_(model.actor.log_std.bias, agent.log_std_init)
+    model.actor_delay_steps = agent.actor_delay_steps
+    return model
 
 
-def _layers(network: Network) -> dict[str, Any]:
-    return {"net_arch": list(network.hidden), "activation_fn": ACTIVATIONS[network.activation]}
+def _layers(agent: AgentSettings) -> dict[str, Any]:
+    return {
+        "net_arch": list(agent.network.hidden),
+        "activation_fn": ACTIVATIONS[agent.network.activation],
+        "features_extractor_class": Magnifier,
+        "features_extractor_kwargs": {"magnification": agent.magnification},
+    }

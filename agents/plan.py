@@ -3,7 +3,7 @@
 from dataclasses import asdict
 from pathlib import Path
 
-from agents.runs import Run, library_versions
+from agents.runs import Run, versions
 from agents.settings import ALGORITHMS, AgentSettings, load_settings
 from formation_env.envs import ENV_IDS
 from formation_env.evaluation import scenario_of
@@ -13,13 +13,14 @@ from formation_env.settings import ConfigError, build, nearest
 def plan_run(
     algorithm: str,
     env: str,
-    steps: int,
+    steps: int | None = None,
     seed: int = 0,
     rows: int | None = None,
     config: Path | None = None,
     validations: int = 20,
     validation_episodes: int = 64,
     threads: int = 1,
+    start: Path | None = None,
     command: str = "",
 ) -> Run:
     """A run with its hyperparameters and scenario read from their files.
@@ -27,13 +28,14 @@ def plan_run(
     Args:
         algorithm: `ppo` or `sac`.
         env: a registered id, or a scenario's name or path.
-        steps: environment steps.
+        steps: environment steps; by default as in the file of hyperparameters.
         seed: of the training.
         rows: environments side by side; by default as in the file of hyperparameters.
         config: that file; by default configs/agents/ALGORITHM.yaml.
         validations: how many over the run.
         validation_episodes: episodes of each.
         threads: of torch.
+        start: an actor to start from.
         command: the command line, to be noted.
 
     Raises:
@@ -41,24 +43,30 @@ def plan_run(
     """
     if algorithm not in ALGORITHMS:
         raise ConfigError(f"no algorithm named {algorithm!r}; {nearest(algorithm, ALGORITHMS)}")
-    known = ENV_IDS.get(env, env)
     if env.endswith("-v0") and env not in ENV_IDS:
         raise ConfigError(f"no environment named {env!r}; {nearest(env, ENV_IDS)}")
+    agent = _with_rows(load_settings(algorithm, Path(env).stem, config), rows)
     data = {
         "algorithm": algorithm,
         "env": env,
         "seed": seed,
-        "steps": steps,
+        "steps": agent.steps if steps is None else steps,
         "validations": validations,
         "validation_episodes": validation_episodes,
         "threads": threads,
-        "agent": _with_rows(load_settings(algorithm, Path(known).stem, config), rows),
+        "agent": agent,
         "scenario": scenario_of(env),
+        "start": "" if start is None else str(start),
         "command": command,
-        "versions": library_versions(),
+        "versions": versions(),
     }
     return build(Run, data, "train")
 
 
 def _with_rows(agent: AgentSettings, rows: int | None) -> AgentSettings:
     return agent if rows is None else build(type(agent), asdict(agent) | {"rows": rows}, "--rows")
+
+
+def default_folder(run: Run) -> Path:
+    """Where a run is kept if nothing else is said: runs/ALGORITHM_ENV_seedN."""
+    return Path("runs") / f"{run.algorithm}_{Path(run.env).stem}_seed{run.seed}"

@@ -1,82 +1,142 @@
 """Learned policies in the classical policies' report."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
-from agents.runs import LearnedPolicy, load_policy, load_run
-from baselines.factories import Classical, PolicyFactory
+from agents.actor import Actor, to_bytes
+from agents.evaluate import open_policy
+from agents.shipped import CARD, read_card, sha256, shipped_paths
+from baselines.factories import classical
 from baselines.registry import POLICIES
 from baselines.report import Wanted, write_report
+from formation_env.envs import ENV_IDS
 from formation_env.evaluation import scenario_of
-from formation_env.scenario import Scenario
+from formation_env.scenario import Scenario, scenario_names
 from formation_env.settings import ConfigError
 
 
-def report_models(models: Sequence[str], envs: Sequence[str] | None, episodes: int, out: Path, command: str) -> Path:
-    """Write the report with all classical policies and some trained ones.
+@dataclass(frozen=True)
+class Learned:
+    """A factory of learned policies: it gives the one that was trained on exactly the scenario, or none.
+
+    Attributes:
+        label: their name in the report.
+        sources: what `open_policy` takes.
+
+    Raises:
+        ConfigError: a faulty policy, or two that were trained on the same scenario.
+    """
+
+    label: str
+    sources: tuple[Path, ...]
+
+    def __post_init__(self) -> None:
+        scenarios = [_open(source).scenario for source in self.sources]
+        for index, scenario in enumerate(scenarios):
+            if scenario in scenarios[:index]:
+                raise ConfigError(f"--model: {self.label}: {self.sources[index]} was trained on what another was, too")
+
+    def __call__(self, original: Scenario, believed: Scenario) -> Actor | None:
+        """The policy for a scenario.
+
+        Args:
+            original: what it must have been trained on.
+            believed: makes no difference: it sees the observation alone.
+        """
+        return next((actor for actor in map(_open, self.sources) if actor.scenario == original), None)
+
+    def settings(self, original: Scenario) -> dict[str, Any] | None:
+        """What tells its policy for a scenario from others, as plain data; None if it has none."""
+        actor = self(original, original)
+        if actor is None:
+            return None
+        widths = [len(bias) for _, bias in actor.layers]
+        return {"layers": widths, "sha256": sha256(to_bytes(actor))} | asdict(actor.functions)
+
+
+@lru_cache
+def _open(source: Path) -> Actor:
+    """A policy, read once."""
+    return open_policy(source)
+
+
+def report_models(
+    models: Sequence[str], envs: Sequence[str] | None, wanted: Wanted, out: Path, command: str, workers: int = 1
+) -> Path:
+    """Write the report with the classical policies and learned ones.
 
     Args:
-        models: each LABEL=FOLDER; runs on several scenarios may share a label.
-        envs: registered ids, or names or paths of scenarios; by default those of the runs.
-        episodes: test episodes per environment.
+        models: each LABEL=PATH; policies of several scenarios may share a label. Without any, those that are shipped,
+            by their algorithms.
+        envs: registered ids, or names or paths of scenarios; by default those of the models, or the registered ones.
+        wanted: how much to fly.
         out: folder of the report.
         command: the command line, to be noted.
+        workers: processes to fly in.
 
     Returns:
         Path of the HTML page.
 
     Raises:
-        ConfigError: a faulty model or environment; one line.
+        ConfigError: a faulty model or environment, or a model that flies nowhere; one line.
         OSError: the folder cannot be written.
     """
-    folders = parse_models(models)
-    if not envs:
-        envs = list(dict.fromkeys(load_run(folder).env for runs in folders.values() for folder in runs))
-    policies: dict[str, PolicyFactory] = {name: Classical(name) for name in POLICIES}
-    for label, runs in folders.items():
-        policies[label] = learned(label, [load_policy(folder) for folder in runs])
-    _check_trained(folders, envs)
-    return write_report(policies, envs, Wanted(episodes, sweep_episodes=0), out, command)
+    sources = parse_models(models) if models else shipped_by_algorithm()
+    learned = {label: Learned(label, tuple(paths)) for label, paths in sources.items()}
+    flown = list(envs or (envs_of(learned) if models else ENV_IDS))
+    if models:
+        _check_flown(learned, flown)
+    return write_report({**classical(), **learned}, flown, wanted, out, command, workers)
 
 
 def parse_models(models: Sequence[str]) -> dict[str, list[Path]]:
-    """Folders by label.
+    """Paths by label.
 
     Raises:
-        ConfigError: an item is not LABEL=FOLDER, or takes a classical policy's name.
+        ConfigError: an item is not LABEL=PATH, or takes a classical policy's name.
     """
-    folders: dict[str, list[Path]] = {}
+    paths: dict[str, list[Path]] = {}
     for item in models:
-        label, equals, folder = item.partition("=")
-        if not (label and equals and folder):
-            raise ConfigError(f"--model: must be LABEL=FOLDER, got {item!r}")
+        label, equals, path = item.partition("=")
+        if not (label and equals and path):
+            raise ConfigError(f"--model: must be LABEL=PATH, got {item!r}")
         if label in POLICIES:
             raise ConfigError(f"--model: {label!r} is the name of a classical policy; choose another label")
-        folders.setdefault(label, []).append(Path(folder))
-    return folders
+        paths.setdefault(label, []).append(Path(path))
+    return paths
 
 
-def learned(label: str, policies: Sequence[LearnedPolicy]) -> PolicyFactory:
-    """A factory that gives the policy trained on exactly the scenario, or none.
+def shipped_by_algorithm() -> dict[str, list[Path]]:
+    """The shipped policies by their algorithms."""
+    paths: dict[str, list[Path]] = {}
+    for path in shipped_paths():
+        paths.setdefault(read_card(path.with_suffix(CARD)).algorithm, []).append(path)
+    return paths
+
+
+def envs_of(learned: Mapping[str, Learned]) -> list[str]:
+    """Ids, or else names, of the scenarios that policies were trained on.
 
     Raises:
-        ConfigError: two were trained on the same.
+        ConfigError: one of them has none.
     """
-    for index, policy in enumerate(policies):
-        if any(policy.scenario == other.scenario for other in policies[:index]):
-            raise ConfigError(f"--model: {label}: two runs were trained on the same scenario")
+    names = {scenario_of(env): env for env in (*scenario_names(), *ENV_IDS)}
+    found = {}
+    for source in (source for factory in learned.values() for source in factory.sources):
+        scenario = _open(source).scenario
+        if scenario not in names:
+            raise ConfigError(f"--env: {source} was trained on a scenario of its own; name its file")
+        found[names[scenario]] = None
+    return list(found)
 
-    def factory(original: Scenario, believed: Scenario) -> LearnedPolicy | None:
-        return next((policy for policy in policies if policy.scenario == original), None)
 
-    return factory
-
-
-def _check_trained(folders: dict[str, list[Path]], envs: Sequence[str]) -> None:
+def _check_flown(learned: Mapping[str, Learned], envs: Sequence[str]) -> None:
     """Refuse a model that flies in none of the environments."""
     scenarios = [scenario_of(env) for env in envs]
-    for label, runs in folders.items():
-        for folder in runs:
-            run = load_run(folder)
-            if run.scenario not in scenarios:
-                raise ConfigError(f"--model: {label}: {folder} was trained on {run.env}, which the report leaves out")
+    for label, factory in learned.items():
+        for source in factory.sources:
+            if _open(source).scenario not in scenarios:
+                raise ConfigError(f"--model: {label}: {source} was trained on what the report leaves out")

@@ -2,23 +2,27 @@
 
 import json
 import platform
+import subprocess
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any, Final
-from zipfile import BadZipFile, is_zipfile
 
-import numpy as np
 from pydantic import Field, Strict
 
+from agents.actor import Actor, read_actor
 from agents.settings import SETTINGS, AgentSettings, Algorithm
-from formation_env.files import replacing, write_texts
+from formation_env.files import replacing, write_files
 from formation_env.scenario import Scenario
 from formation_env.settings import ConfigError, Text, build, settings
 
 MODEL: Final = "model.zip"
-"""The model that was best on the validation seeds."""
-LAST_MODEL: Final = "last.zip"
+"""The model that was best on the validation seeds, as Stable-Baselines3 saves it."""
+BEST: Final = "best.safetensors"
+"""Its actor alone, see `agents.actor`."""
+START: Final = "start.safetensors"
+"""A copy of the actor that the run started from."""
+CHECKPOINT: Final = "checkpoint.pt"
 RUN: Final = "settings.json"
 CURVE: Final = "validation.csv"
 TENSORBOARD: Final = "tensorboard"
@@ -40,8 +44,9 @@ class Run:
         threads: of torch; other numbers give other rounding.
         agent: the hyperparameters.
         scenario: what is flown.
+        start: path of the actor that it starts from, if it does from one.
         command: the command line.
-        versions: of the libraries.
+        versions: of the libraries, and the revision of the sources.
     """
 
     algorithm: Algorithm
@@ -53,26 +58,39 @@ class Run:
     threads: Annotated[int, Strict(), Field(ge=1)] = 1
     agent: AgentSettings
     scenario: Scenario
+    start: Text = ""
     command: Text = ""
     versions: dict[str, str] = Field(default_factory=dict)
 
 
-def library_versions() -> dict[str, str]:
-    """Versions of the interpreter and of the libraries behind a model."""
-    return {"python": platform.python_version()} | {name: metadata.version(name) for name in LIBRARIES}
+def versions() -> dict[str, str]:
+    """Versions of the interpreter and of the libraries behind a model, and git's revision of a checkout."""
+    libraries = {name: metadata.version(name) for name in LIBRARIES}
+    return {"python": platform.python_version()} | libraries | {"git": _revision(Path(__file__).parent)}
+
+
+def _revision(folder: Path) -> str:
+    """What git calls the sources, `-dirty` if they were changed since; empty where there is no git."""
+    command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--exclude=*", "--abbrev=40"]
+    try:
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return ""
 
 
 def start_run(run: Run, folder: Path) -> None:
-    """Make a run's folder and write its settings.
+    """Make a run's folder and write its settings, and a copy of the actor that it starts from.
 
     Raises:
         ConfigError: the folder holds a run already.
         OSError: it cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     if (folder / RUN).exists():
-        raise ConfigError(f"{folder}: holds a run already; give another folder, or remove this one")
-    write_texts(folder, {RUN: json.dumps(asdict(run), indent=2) + "\n"})
+        raise ConfigError(f"{folder}: holds a run already; go on with --resume {folder}, or give another folder")
+    files = {RUN: (json.dumps(asdict(run), indent=2) + "\n").encode()}
+    if run.start:
+        files[START] = Path(run.start).read_bytes()
+    write_files(folder, files)
 
 
 def load_run(folder: Path) -> Run:
@@ -103,48 +121,11 @@ def save_model(model: Any, path: Path) -> None:
         model.save(temporary)
 
 
-class LearnedPolicy:
-    """A trained model as a policy, deterministic unless asked otherwise.
-
-    Attributes:
-        scenario: what it was trained on.
-        settings: its hyperparameters.
-    """
-
-    def __init__(self, run: Run, model: Any) -> None:
-        self.scenario = run.scenario
-        self.settings = run.agent
-        self._policy = model.policy
-        self._scale = np.float32(run.agent.action_scale)
-
-    def predict(
-        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> tuple[Any, Any]:
-        """Actions (3,) or (rows, 3), in units of max_accel_m_s2, for one observation or a batch; and `state`."""
-        actions, _ = self._policy.predict(observation, deterministic=deterministic)
-        return self._scale * actions, state
-
-
-def load_policy(folder: str | Path, name: str = MODEL) -> LearnedPolicy:
-    """The policy of a training run. SB3's files hold pickled objects, so load only files that you trust.
-
-    Args:
-        folder: the run's.
-        name: `model.zip`, the best on the validation seeds, or `last.zip`.
+def load_best(folder: Path) -> tuple[Run, Actor]:
+    """A run and the policy that was best on its validation seeds. Nothing is unpickled.
 
     Raises:
-        ConfigError: no run or no model is there, or the file is damaged; one line.
+        ConfigError: no run or no policy is there, or a file is damaged; one line.
     """
-    from agents.models import CLASSES
-
-    run, path = load_run(Path(folder)), Path(folder) / name
-    if not path.is_file():
-        raise ConfigError(f"{path}: no such file; the run has saved no model")
-    if not is_zipfile(path):
-        raise ConfigError(f"{path}: damaged, or no model")
-    try:
-        # A policy needs no memory of transitions.
-        model = CLASSES[run.algorithm].load(path, device="cpu", custom_objects={"buffer_size": 1})
-    except (BadZipFile, KeyError, EOFError) as error:
-        raise ConfigError(f"{path}: damaged, or no model: {error}") from None
-    return LearnedPolicy(run, model)
+    run = load_run(folder)
+    return run, read_actor(folder / BEST, run.scenario)

@@ -1,9 +1,8 @@
 """Hyperparameters of the learning algorithms, and their YAML files.
 
 Observations are already of order 1 and are learnt from as they are. Rewards are in m/s and small; they are multiplied
-by one constant, `reward_scale`, so that values are of order 1: unlike running statistics, a constant cannot drift, and
-a saved model needs nothing beside it. Actions may be learnt in a share of the greatest thrust, `action_scale`: where a
-mission needs little of it, exploration over all of it costs far more fuel than the mission.
+by one constant, `reward_scale`, so that values are of order 1, or divided by the running deviation of the returns.
+Actions are learnt as throttles, see `agents.throttle`.
 """
 
 from collections.abc import Mapping
@@ -12,13 +11,16 @@ from typing import Annotated, Any, Final, Literal, Self, get_args
 
 from pydantic import Field, Strict, model_validator
 
+from formation_env.envs import ENV_IDS
 from formation_env.scenario import config_folder, scenario_names
 from formation_env.settings import (
     ConfigError,
+    Flag,
     NonNegative,
     Positive,
     Probability,
     Real,
+    Text,
     build,
     load_yaml,
     nearest,
@@ -30,6 +32,7 @@ ALGORITHMS: Final[tuple[Algorithm, ...]] = get_args(Algorithm)
 
 Share = Annotated[Probability, Field(gt=0)]
 Count = Annotated[int, Strict(), Field(ge=1)]
+Whole = Annotated[int, Strict(), Field(ge=0)]
 
 
 @settings
@@ -46,45 +49,102 @@ class Network:
 
 
 @settings
-class PPOSettings:
+class Pretraining:
+    """What comes before reinforcement learning, see `agents.pretraining`.
+
+    Attributes:
+        teacher: the classical policy that is imitated.
+        rounds: flights of imitation; 0 begins with random weights.
+        rows: episodes of each.
+        updates: gradient steps through the model.
+        episodes: recorded episodes that the gradient is taken over.
+        batch: of these, in each step.
+        learning_rate: greatest; it falls to nearly nothing with the cosine.
+    """
+
+    teacher: Text = "lqr"
+    rounds: Whole = 3
+    rows: Count = 96
+    updates: Whole = 300
+    episodes: Count = 2048
+    batch: Count = 128
+    learning_rate: Positive = 1e-3
+
+
+@settings
+class CommonSettings:
+    """What all algorithms have.
+
+    Attributes:
+        steps: environment steps to train for, unless the command says otherwise.
+        rows: environments side by side.
+        gamma: discount per step.
+        throttle_power: p of the thrust sign(z) |z|^p that the network's output z stands for, in units of the greatest.
+        magnification: of the errors that the network reads, see `agents.features`.
+        log_std_init: natural logarithm of the first exploration noise, of the throttle. Noise costs fuel, so it
+            starts low.
+        use_sde: whether the noise depends on the state (gSDE, Raffin et al. 2022); PPO draws it once for a rollout, SAC
+            at each step.
+        sde_sample_freq: steps after which that noise is drawn anew within a rollout; -1 is never.
+        reward_scale: rewards are multiplied by this, per m/s.
+        normalise_reward: whether they are then divided by the running deviation of the discounted returns.
+        shaping_weight: of the potential minus the predicted miss at arrival, (m/s) per m; see `agents.shaping`.
+        bootstrap_end: whether the plan's end counts as an interruption, with the value of the last observation behind
+            it, and not as the end that it is.
+        network: layers.
+        pretraining: what comes before; none if it is left out.
+    """
+
+    steps: Count = 2_000_000
+    rows: Count = 64
+    gamma: Probability = 0.995
+    throttle_power: Positive = 2.0
+    magnification: Positive = 50.0
+    log_std_init: Real = -1.0
+    use_sde: Flag = False
+    sde_sample_freq: Annotated[int, Strict(), Field(ge=-1)] = -1
+    reward_scale: Positive = 3.0
+    normalise_reward: Flag = False
+    shaping_weight: NonNegative = 0.0
+    bootstrap_end: Flag = False
+    network: Network = Network()
+    pretraining: Pretraining | None = None
+
+
+@settings
+class PPOSettings(CommonSettings):
     """Proximal policy optimisation (Schulman et al. 2017).
 
     Attributes:
-        rows: environments side by side.
         rollout_steps: steps of each row between updates.
         batch_size: samples of a gradient step.
         epochs: passes over each rollout.
         learning_rate: at the start; it falls linearly to learning_rate_end at the last step.
         learning_rate_end: at the end.
-        gamma: discount per step.
         gae_lambda: mix of the advantage estimator (Schulman et al. 2016).
         clip_range: greatest useful change of the probability ratio.
+        target_kl: an update ends early beyond 1.5 times this divergence from the policy before; 0 is never.
         entropy_coef: weight of the entropy in the loss.
         value_coef: weight of the value error in the loss.
         max_grad_norm: gradients are cut to this norm.
-        log_std_init: natural logarithm of the first exploration noise, in units of action_scale. Noise costs fuel, so
-            it starts low.
-        reward_scale: rewards are multiplied by this, per m/s.
-        action_scale: the policy's actions are multiplied by this: its 1 is this share of the greatest thrust.
-        network: layers.
+        log_std_min: the logarithm of the noise does not fall below this.
+        warmup_rollouts: the first updates are of the critic alone, so that it does not spoil an actor it starts from.
     """
 
-    rows: Count = 128
-    rollout_steps: Count = 128
-    batch_size: Annotated[int, Strict(), Field(ge=2)] = 512
-    epochs: Count = 5
-    learning_rate: Positive = 7e-4
+    rows: Count = 2048
+    rollout_steps: Count = 32
+    batch_size: Annotated[int, Strict(), Field(ge=2)] = 8192
+    epochs: Count = 4
+    learning_rate: Positive = 1e-3
     learning_rate_end: NonNegative = 3e-5
-    gamma: Probability = 0.995
     gae_lambda: Probability = 0.95
     clip_range: Positive = 0.2
+    target_kl: NonNegative = 0.0
     entropy_coef: NonNegative = 0.0
     value_coef: NonNegative = 0.5
     max_grad_norm: Positive = 0.5
-    log_std_init: Real = -1.0
-    reward_scale: Positive = 3.0
-    action_scale: Share = 0.2
-    network: Network = Network()
+    log_std_min: Real = -5.0
+    warmup_rollouts: Whole = 0
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -96,26 +156,22 @@ class PPOSettings:
 
 
 @settings
-class SACSettings:
+class SACSettings(CommonSettings):
     """Soft actor-critic (Haarnoja et al. 2018), with its temperature learnt.
 
     Attributes:
-        rows: environments side by side.
         gradient_steps: updates after each step of all rows.
         batch_size: samples of an update.
-        buffer_size: transitions remembered.
-        learning_starts: steps flown at random before the first update.
+        buffer_size: transitions remembered; those there are stand in the checkpoint, too, at 330 bytes each.
+        learning_starts: steps flown before the first update: at random, or by the actor that the run starts from.
         learning_rate: of actor, critics and temperature.
-        gamma: discount per step.
         tau: share by which the target critics follow in each update.
         entropy_init: first temperature.
-        target_entropy: entropy of the actions that the temperature aims at, in nats; low, since noise costs fuel.
-        reward_scale: rewards are multiplied by this, per m/s.
-        action_scale: the policy's actions are multiplied by this: its 1 is this share of the greatest thrust.
-        network: layers.
+        target_entropy: entropy of the throttles that the temperature aims at, in nats; low, since noise costs fuel.
+        actor_delay_steps: up to this step the critics alone learn.
     """
 
-    rows: Count = 64
+    steps: Count = 200_000
     gradient_steps: Count = 8
     batch_size: Count = 256
     buffer_size: Count = 300_000
@@ -125,23 +181,25 @@ class SACSettings:
     tau: Share = 0.02
     entropy_init: Positive = 0.01
     target_entropy: Real = -6.0
+    actor_delay_steps: Whole = 0
     reward_scale: Positive = 10.0
-    action_scale: Share = 0.1
     network: Network = Network(activation="relu")
 
 
 AgentSettings = PPOSettings | SACSettings
 SETTINGS: Final[dict[str, type[PPOSettings] | type[SACSettings]]] = {"ppo": PPOSettings, "sac": SACSettings}
-OVERRIDES: Final = "scenarios"
-"""Key of a file under which scenarios have hyperparameters of their own."""
+SQUASH_OF: Final[dict[str, str]] = {"ppo": "clip", "sac": "tanh"}
+"""How an algorithm brings a network's output to [-1, 1], see `agents.actor`."""
+OVERRIDES: Final = "environments"
+"""Key of a file under which environments have hyperparameters of their own."""
 
 
-def load_settings(algorithm: Algorithm, scenario_name: str, path: Path | None = None) -> AgentSettings:
-    """Hyperparameters of an algorithm for a scenario.
+def load_settings(algorithm: Algorithm, env: str, path: Path | None = None) -> AgentSettings:
+    """Hyperparameters of an algorithm for an environment.
 
     Args:
         algorithm: which.
-        scenario_name: its overrides are applied, if the file has some under `scenarios`.
+        env: a registered id or a scenario's name; its overrides are applied, if the file has some under `environments`.
         path: a YAML file; by default configs/agents/ALGORITHM.yaml.
 
     Raises:
@@ -155,18 +213,19 @@ def load_settings(algorithm: Algorithm, scenario_name: str, path: Path | None = 
     chosen = build(SETTINGS[algorithm], common, str(path))
     for name, own in _overrides(data, path).items():
         overridden = build(SETTINGS[algorithm], {**common, **own}, f"{path}: {OVERRIDES}.{name}")
-        chosen = overridden if name == scenario_name else chosen
+        chosen = overridden if ENV_IDS.get(name, name) == ENV_IDS.get(env, env) else chosen
     return chosen
 
 
 def _overrides(data: Mapping[str, Any], path: Path) -> dict[str, Mapping[str, Any]]:
-    """Each scenario's own keys, all of them checked to be mappings of scenarios that exist."""
+    """Each environment's own keys, all of them checked to be mappings of ids or scenarios that exist."""
     overrides = data.get(OVERRIDES, {})
     if not isinstance(overrides, Mapping):
-        raise ConfigError(f"{path}: {OVERRIDES}: must be a mapping of scenarios, got {str(overrides)[:80]}")
+        raise ConfigError(f"{path}: {OVERRIDES}: must be a mapping of environments, got {str(overrides)[:80]}")
+    known = [*ENV_IDS, *scenario_names()]
     for name, own in overrides.items():
-        if name not in scenario_names():
-            raise ConfigError(f"{path}: {OVERRIDES}.{name}: no such scenario; {nearest(str(name), scenario_names())}")
+        if name not in known:
+            raise ConfigError(f"{path}: {OVERRIDES}.{name}: no such environment; {nearest(str(name), known)}")
         if not isinstance(own, Mapping):
             raise ConfigError(f"{path}: {OVERRIDES}.{name}: must be a mapping, got {str(own)[:80]}")
     return dict(overrides)

@@ -1,15 +1,28 @@
-"""Training: a model, its batched environment and its validation, from start to end or to the interrupt."""
+"""Training: a model, its batched environment and its validation, from start to end, or from stop to stop."""
 
+import contextlib
+import math
+import signal
+import threading
+import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import torch
+from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import configure
 from tqdm import tqdm
 
-from agents.models import make_model
-from agents.runs import TENSORBOARD, Run, start_run
-from agents.validation import Validation
-from agents.vec_env import FormationVecEnv
+from agents.actor import Functions, to_bytes
+from agents.checkpoint import State, load_checkpoint, restore
+from agents.models import make_env, make_model
+from agents.pretraining.pretrain import pretrain
+from agents.runs import CHECKPOINT, START, TENSORBOARD, Run, load_run, start_run
+from agents.settings import SQUASH_OF
+from agents.start import start_from
+from agents.validation import Outcome, Validation
+from formation_env.files import write_files
 from formation_env.seeds import seeds
 from formation_env.settings import ConfigError
 
@@ -26,31 +39,124 @@ def training_seeds(seed: int, rows: int) -> range:
         raise ConfigError(f"seed: no training seeds are left for {rows} rows, got {seed}") from None
 
 
-def train(run: Run, folder: Path) -> bool:
-    """Train as the run says, and keep all in its folder. An interrupt (Ctrl-C) ends the training and saves.
+def train(run: Run, folder: Path, time_limit_s: float = math.inf) -> Outcome:
+    """Train as the run says, and keep all in its folder. An interrupt (Ctrl-C) saves and ends.
+
+    Args:
+        run: what to train.
+        folder: of the run; must not hold one yet.
+        time_limit_s: the training stops before the first rollout after this time; s.
 
     Returns:
-        Whether the training came to its end.
+        Why it ended.
 
     Raises:
-        ConfigError: the folder holds a run already, or the seed is too large.
+        ConfigError: the folder holds a run already, the seed is too large, or the actor to start from does not fit.
         OSError: the folder cannot be written.
     """
+    training_seeds(run.seed, run.agent.rows)
+    if run.agent.pretraining is None or run.start:
+        model = _new_model(run, Path(run.start) if run.start else None)
+        start_run(run, folder)
+    else:
+        start_run(run, folder)
+        model = _new_model(run, _pretrained(run, folder))
+    return _learn(model, run, folder, None, time_limit_s)
+
+
+def resume(folder: Path, time_limit_s: float = math.inf) -> Outcome:
+    """Go on with a run from its last checkpoint, as if it had never stopped.
+
+    Args:
+        folder: of the run.
+        time_limit_s: as in `train`, from now on.
+
+    Returns:
+        Why it ended.
+
+    Raises:
+        ConfigError: no run is there, or one of its files is faulty.
+        OSError: the folder cannot be written.
+    """
+    run = load_run(folder)
+    model = _new_model(run, _pretrained(run, folder) if run.agent.pretraining or run.start else None)
+    state = load_checkpoint(folder / CHECKPOINT) if (folder / CHECKPOINT).exists() else None
+    if state is not None:
+        restore(model, state)
+    return _learn(model, run, folder, state, time_limit_s)
+
+
+def _pretrained(run: Run, folder: Path) -> Path:
+    """The actor in a run's folder that it starts from; made, if it is not there yet."""
+    path, agent = folder / START, run.agent
+    if agent.pretraining is not None and not path.exists():
+        torch.set_num_threads(run.threads)
+        functions = Functions(
+            agent.network.activation, SQUASH_OF[run.algorithm], agent.throttle_power, agent.magnification
+        )
+        actor = pretrain(
+            agent.pretraining, agent.network, functions, run.scenario, run.seed, run.validation_episodes, tqdm.write
+        )
+        write_files(folder, {START: to_bytes(actor)})
+    return path
+
+
+def _new_model(run: Run, start: Path | None) -> BaseAlgorithm:
+    """A model before its first step, with the actor of a file if there is one to start from."""
     first = training_seeds(run.seed, run.agent.rows)[0]
-    start_run(run, folder)
     torch.set_num_threads(run.threads)
-    env = FormationVecEnv(run.agent.rows, run.scenario, run.agent.reward_scale, run.agent.action_scale, stagger=True)
+    env = make_env(run.agent, run.scenario)
     model = make_model(run.agent, env, run.seed)
     env.seed(first)
+    if start is not None:
+        start_from(start, model, run.agent, run.scenario)
+    return model
+
+
+def _learn(model: BaseAlgorithm, run: Run, folder: Path, state: State | None, time_limit_s: float) -> Outcome:
+    """Train up to the run's last step, or until it has to end."""
     model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
-    finished = True
-    with tqdm(total=run.steps, unit="step", unit_scale=True, dynamic_ncols=True, smoothing=0.1) as bar:
-        validation = Validation(run, folder, bar)
+    ends_s = time.perf_counter() + time_limit_s
+    with _stop_asked() as stop, _bar(run, model.num_timesteps) as bar:
+
+        def must_end() -> Outcome | None:
+            if stop.is_set():
+                return "interrupted"
+            return "out of time" if time.perf_counter() > ends_s else None
+
+        validation = Validation(run, folder, bar, must_end, state)
         try:
-            model.learn(run.steps, validation)
-            validation.note()
-        except KeyboardInterrupt:
-            finished = False
-            validation.save_last()
-    model.logger.close()
-    return finished
+            model.learn(run.steps - model.num_timesteps, validation, reset_num_timesteps=state is None)
+            if validation.outcome is None:
+                validation.note()
+        except KeyboardInterrupt:  # the second one; the last checkpoint stays
+            validation.outcome = "interrupted"
+        finally:
+            model.logger.close()
+    return validation.outcome or "finished"
+
+
+def _bar(run: Run, done: int) -> "tqdm[Any]":
+    return tqdm(total=run.steps, initial=done, unit="step", unit_scale=True, dynamic_ncols=True, smoothing=0.1)
+
+
+@contextlib.contextmanager
+def _stop_asked() -> Iterator[threading.Event]:
+    """Ctrl-C and SIGTERM ask to stop where the model is whole; the second one interrupts at once, as ever."""
+    asked = threading.Event()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def ask(number: int, frame: object) -> None:
+        asked.set()
+        put_back()
+
+    def put_back() -> None:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+    try:
+        for number in before:
+            signal.signal(number, ask)
+        yield asked
+    finally:
+        put_back()

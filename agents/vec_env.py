@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
+from agents.shaping import Shaping
+from agents.throttle import throttle
 from formation_env.envs import FormationVectorEnv, interface
 from formation_env.evaluation import scenario_of
 from formation_env.scenario import Scenario
@@ -18,12 +20,13 @@ Infos = list[dict[str, Any]]
 Row = dict[str, Any]
 
 
-class FormationVecEnv(VecEnv):
+class Sb3VecEnv(VecEnv):
     """Rows of a `FormationVectorEnv` as Stable-Baselines3 wants them.
 
     The info of a row is empty but at the end of its episode; then it has `terminal_observation`,
-    `TimeLimit.truncated` (the formation goes on, so the value of the last observation counts), `episode` as SB3's
-    Monitor gives it (return `r` in m/s, not scaled, length `l`, seconds `t`), and `episode_totals` (metrics by name).
+    `TimeLimit.truncated`, `episode` as SB3's Monitor gives it (return `r` in m/s as it is reported, whatever is learnt
+    from; length `l`, seconds `t`), and `episode_totals` (metrics by name). The list of infos is one and the same all
+    the time, and so is the dict of a row in which no episode has just ended: read them, and do not keep them.
     """
 
     def __init__(
@@ -31,7 +34,9 @@ class FormationVecEnv(VecEnv):
         num_envs: int,
         scenario: str | Path | Scenario,
         reward_scale: float = 1.0,
-        action_scale: float = 1.0,
+        throttle_power: float = 1.0,
+        shaping: Shaping | None = None,
+        bootstrap_end: bool = True,
         stagger: bool = False,
     ) -> None:
         """Make the environment.
@@ -40,14 +45,21 @@ class FormationVecEnv(VecEnv):
             num_envs: rows.
             scenario: a registered id, a scenario's name or path, or a Scenario.
             reward_scale: rewards are multiplied by this, units per m/s.
-            action_scale: actions are multiplied by this: 1 becomes this share of the greatest thrust.
+            throttle_power: p of the thrust sign(z) |z|^p that an action z stands for; see `agents.throttle`.
+            shaping: what is added to the rewards before they are multiplied.
+            bootstrap_end: tell of the plan's end as `TimeLimit.truncated`, so that SB3 adds the value of the last
+                observation there; else as an end behind which nothing counts, which is how returns are reported.
             stagger: begin the rows' episodes evenly spread over an episode's length, not all at once, so that each
                 rollout sees all parts of the mission. Until a row's first end it is where coasting took it.
         """
         self.batch = FormationVectorEnv(num_envs, scenario_of(scenario))
         self.reward_scale = reward_scale
-        self.action_scale = action_scale
+        self.throttle_power = throttle_power
+        self.shaping = shaping
+        self.bootstrap_end = bootstrap_end
         self.stagger = stagger
+        self._infos: Infos = [{} for _ in range(num_envs)]
+        self._told = np.zeros(0, np.intp)
         self._actions = np.zeros((num_envs, 3), np.float32)
         self._birth_s = time.perf_counter()
         super().__init__(num_envs, self.batch.single_observation_space, self.batch.single_action_space)
@@ -57,7 +69,22 @@ class FormationVecEnv(VecEnv):
         observations, _ = self.batch.reset(seed=self._seeds, options=self._batch_options())
         self._reset_seeds()
         self._reset_options()
-        return self._spread(observations) if self.stagger else observations
+        if self.stagger:
+            observations = self._spread(observations)
+        if self.shaping is not None:
+            self.shaping.restart(observations)
+        return observations
+
+    def memory(self) -> NDArray[np.float64]:
+        """All that the rows carry from one step to the next; a copy."""
+        return self.batch.simulation.memory()
+
+    def recall(self, memory: NDArray[np.float64], observations: NDArray[np.float32]) -> None:
+        """Go on from what `memory` gave, and from the observations (num_envs, SIZE) of that moment."""
+        self.batch.reset(seed=0)
+        self.batch.simulation.recall(memory)
+        if self.shaping is not None:
+            self.shaping.restart(observations)
 
     def _batch_options(self) -> dict[str, Any] | None:
         """The rows' options as one; an option is given to all rows or to none."""
@@ -81,17 +108,34 @@ class FormationVecEnv(VecEnv):
 
     def step_async(self, actions: NDArray[np.float32]) -> None:
         """Keep the actions (num_envs, 3) for `step_wait`."""
-        self._actions = self.action_scale * actions
+        self._actions = throttle(actions, self.throttle_power)
 
     def step_wait(self) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], Infos]:
         """Fly one step in all rows; rows that end begin their next episode."""
         observations, rewards, terminations, truncations, batch_infos = self.batch.step(self._actions)
         ended = terminations | truncations
-        infos: Infos = [{} for _ in range(self.num_envs)]
-        for row in np.flatnonzero(ended):
-            infos[row] = self._last_info(batch_infos, int(row))
-            infos[row]["TimeLimit.truncated"] = bool(truncations[row] and not terminations[row])
-        return observations, (self.reward_scale * rewards).astype(np.float32), ended, infos
+        interrupted = truncations & ~terminations & self.bootstrap_end
+        self._tell(batch_infos, np.flatnonzero(ended), interrupted)
+        if self.shaping is not None:
+            rewards += self.shaping.added(observations, ended, self._last_potentials(ended, interrupted))
+        return observations, (self.reward_scale * rewards).astype(np.float32), ended, self._infos
+
+    def _tell(self, batch_infos: dict[str, Any], ended: NDArray[np.intp], interrupted: NDArray[np.bool_]) -> None:
+        """Put the infos of the rows that ended into the list, and take those of the step before out of it."""
+        for row in self._told:
+            self._infos[row] = {}
+        for row in ended.tolist():
+            self._infos[row] = self._last_info(batch_infos, row)
+            self._infos[row]["TimeLimit.truncated"] = bool(interrupted[row])
+        self._told = ended
+
+    def _last_potentials(self, ended: NDArray[np.bool_], interrupted: NDArray[np.bool_]) -> NDArray[np.float64]:
+        """The potentials that the ended rows came to: 0, but where the value of the last observation counts."""
+        last = np.zeros(len(ended))
+        if self.shaping is not None and interrupted.any():
+            seen = np.stack([self._infos[row]["terminal_observation"] for row in np.flatnonzero(interrupted)])
+            last[interrupted] = self.shaping.potential(seen)
+        return last[ended]
 
     def _last_info(self, infos: dict[str, Any], row: int) -> Row:
         """What SB3 wants to know of a row's episode that has ended."""

@@ -4,14 +4,13 @@ import os
 import shlex
 import signal
 import sys
-from collections.abc import Callable, Sequence
-from importlib.util import find_spec
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, Final, NoReturn
 
 import typer
 
-from baselines.factories import Classical
+from baselines.factories import classical
 from baselines.registry import FLOORS, POLICIES, SLOW
 from formation_env.envs import ENV_IDS
 from formation_env.settings import ConfigError
@@ -19,6 +18,10 @@ from formation_env.settings import ConfigError
 Envs = Annotated[list[str] | None, typer.Option("--env", help="Id, scenario name or YAML file; may be repeated.")]
 Policies = Annotated[list[str] | None, typer.Option("--policy", help="Name of a policy; may be repeated.")]
 Episodes = Annotated[int, typer.Option(min=1, help="Episodes per policy and environment.")]
+SlowEpisodes = Annotated[int, typer.Option(min=1, help="Of these the first ones, for mpc, which is slow.")]
+SweepEpisodes = Annotated[int, typer.Option(min=0, help="For fronts and robustness; 0 leaves them out.")]
+BoundEpisodes = Annotated[int, typer.Option(min=0, help="Of these, for the fronts' bound; 0 is none.")]
+Fine = Annotated[bool, typer.Option("--fine", help="Fronts and robustness at more values.")]
 Out = Annotated[Path, typer.Option(file_okay=False, help="Folder to write to.")]
 Processes = Annotated[int, typer.Option(min=1, help="To fly in.")]
 Resume = Annotated[bool, typer.Option("--resume", help="Keep finished flights in OUT/flown; fly none of them again.")]
@@ -29,35 +32,24 @@ def report(
     env: Envs = None,
     policy: Policies = None,
     episodes: Episodes = 100,
-    slow_episodes: Annotated[int, typer.Option(min=1, help="Of these the first ones, for mpc, which is slow.")] = 5,
-    sweep_episodes: Annotated[int, typer.Option(min=0, help="For fronts and robustness; 0 leaves them out.")] = 10,
-    bound_episodes: Annotated[int, typer.Option(min=0, help="Of these, for the fronts' bound; 0 is none.")] = 2,
-    fine: Annotated[bool, typer.Option("--fine", help="Fronts and robustness at more values.")] = False,
+    slow_episodes: SlowEpisodes = 5,
+    sweep_episodes: SweepEpisodes = 10,
+    bound_episodes: BoundEpisodes = 2,
+    fine: Fine = False,
     resume: Resume = False,
     out: Out = Path("reports"),
     processes: Processes = PROCESSES,
 ) -> None:
     """Fly the classical policies on the same seeds, and write tables and an HTML page."""
-    # without the solver the report is one without mpc and bound
-    names = policy or [name for name in POLICIES if name not in SLOW or find_spec("clarabel")]
     command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
 
     def write() -> Path:
         from baselines.report import Wanted, write_report
 
         wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, not fine, resume)
-        return write_report(_classical(names), env or list(ENV_IDS), wanted, out, command, processes)
+        return write_report(classical(policy or ()), env or list(ENV_IDS), wanted, out, command, processes)
 
-    _run("report", out, write)
-
-
-def _classical(names: Sequence[str]) -> dict[str, Classical]:
-    """Factories of classical policies, each once.
-
-    Raises:
-        ConfigError: there is none of a name.
-    """
-    return {name: Classical(name) for name in names}
+    run_report("report", out, write)
 
 
 def reproduce(
@@ -78,7 +70,7 @@ def reproduce(
 
         return write_thesis(out, Wanted(episodes, step_s, claims=claims, models=models), command, processes)
 
-    _run("reproduce", out, write)
+    run_report("reproduce", out, write)
 
 
 def sweep(
@@ -100,12 +92,12 @@ def sweep(
         from baselines.sweep.report import Wanted, write_sweep
 
         wanted = Wanted(episodes, bound_episodes, resume)
-        return write_sweep(_classical(names), envs, wanted, out, command, processes)
+        return write_sweep(classical(names), envs, wanted, out, command, processes)
 
-    _run("sweep", out, write)
+    run_report("sweep", out, write)
 
 
-def _run(name: str, out: Path, write: Callable[[], Path]) -> None:
+def run_report(name: str, out: Path, write: Callable[[], Path]) -> None:
     """Write a report, and end the program with one line if that fails.
 
     Args:

@@ -1,12 +1,14 @@
 """Policies as data: made where they are flown, in other processes, too."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, is_dataclass
 from functools import lru_cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol
 
 from baselines.policy import AccelerationPolicy
-from baselines.registry import gains_path, make_policy, policy_class, read_gains
+from baselines.registry import POLICIES, SLOW, gains_path, make_policy, policy_class, read_gains
 from formation_env.evaluation import Policy
 from formation_env.scenario import Scenario
 
@@ -55,6 +57,19 @@ class Classical:
             ConfigError: the gain file is wrong.
         """
         return _gains(self.name, gains_path(original))
+
+
+def classical(names: Sequence[str] = ()) -> dict[str, Classical]:
+    """Factories of classical policies, each once.
+
+    Args:
+        names: of the policies; by default all, but for the slow ones where their solver is not installed.
+
+    Raises:
+        ConfigError: there is none of a name.
+    """
+    chosen = names or [name for name in POLICIES if name not in SLOW or find_spec("clarabel")]
+    return {name: Classical(name) for name in chosen}
 
 
 @lru_cache

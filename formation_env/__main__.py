@@ -11,10 +11,15 @@ app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False, pret
 
 
 @app.command()
-def bench(rows: Annotated[int, typer.Option(min=1, help="rows of the batched environment")] = 4096) -> None:
+def bench(
+    rows: Annotated[int, typer.Option(min=1, help="rows of the batched environment")] = 4096,
+    sb3: Annotated[bool, typer.Option("--sb3", help="how fast Stable-Baselines3's PPO learns, instead")] = False,
+) -> None:
     """Print steps per second beside Gymnasium's own environments, measured in turns in this run."""
     from formation_env import bench as benchmark
 
+    if sb3:
+        raise typer.Exit(benchmark.learning())
     for name, seconds in benchmark.startup().items():
         typer.echo(f"{name:20s} {seconds:6.2f} s")
     table = benchmark.table(rows)

@@ -85,6 +85,11 @@ def startup() -> dict[str, float]:
     return dict(zip(("import", "first single step", "first batched step"), map(float, output.split()), strict=True))
 
 
+def learning() -> int:
+    """Have `agents`, which nothing here imports, print how fast PPO learns; its exit status."""
+    return subprocess.call([sys.executable, "-m", "agents", "bench"])
+
+
 def table(rows: int) -> pd.DataFrame:
     """Rates of all environments: columns steps_per_s and ratios to CartPole, for one environment and for a batch.
 

@@ -8,39 +8,21 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
+from agents_helpers import small_run
 from typer.testing import CliRunner
 
-from agents import load_policy
-from agents.__main__ import INTERRUPTED, MISTAKE, app
+from agents.__main__ import MISTAKE, app
+from agents.evaluate import Sb3Policy
+from agents.models import CLASSES
 from agents.plan import plan_run
-from agents.report import learned, parse_models
-from agents.runs import CURVE, LAST_MODEL, MODEL, RUN, Run, load_run, save_model, start_run
+from agents.runs import BEST, CHECKPOINT, CURVE, MODEL, RUN, Run, load_best, load_run, save_model, start_run
 from agents.settings import PPOSettings, SACSettings, load_settings
 from agents.train import train, training_seeds
-from agents.validation import Validation, validate
-from formation_env import ConfigError, FormationEnv, Scenario
+from agents.validation import validate
+from formation_env import ConfigError
 from formation_env.evaluation import evaluate
 from formation_env.files import replacing
 from formation_env.seeds import seeds
-
-SCENARIO = """
-spacecraft: {max_accel_m_s2: 0.002}
-start: {formation: {kind: space_circle, x0_m: 2000, vx0_m_s: 0.2}, spread_pos_m: 50, spread_vel_m_s: 0.05}
-phases:
-  - {formation: {kind: space_circle, x0_m: 2000, vx0_m_s: 0.2}, hold_periods: 0.1}
-"""
-SMALL = {
-    "ppo": "{rows: 8, rollout_steps: 16, batch_size: 64, epochs: 1, network: {hidden: [8]}}",
-    "sac": "{rows: 8, batch_size: 16, buffer_size: 500, learning_starts: 64, network: {hidden: [8]}}",
-}
-
-
-def small_run(folder: Path, algorithm: str, **changes: Any) -> Run:
-    """A run of a second on a scenario of 19 steps."""
-    (folder / "scenario.yaml").write_text(SCENARIO)
-    (folder / "agent.yaml").write_text(SMALL[algorithm])
-    given = {"steps": 512, "validations": 2, "validation_episodes": 4, "config": folder / "agent.yaml"}
-    return plan_run(algorithm, str(folder / "scenario.yaml"), **(given | changes))
 
 
 @pytest.fixture(scope="module", params=["ppo", "sac"])
@@ -48,14 +30,15 @@ def finished(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     """A short training of each algorithm."""
     folder = tmp_path_factory.mktemp(request.param)
     run = small_run(folder, request.param)
-    assert train(run, folder / "run")
+    assert train(run, folder / "run") == "finished"
     return run, folder / "run"
 
 
 def test_a_run_leaves_models_settings_curve_and_tensorboard(finished: tuple[Run, Path]) -> None:
     """The contract of a run's folder; no temporary files stay."""
     run, folder = finished
-    assert sorted(path.name for path in folder.iterdir()) == sorted([MODEL, LAST_MODEL, RUN, CURVE, "tensorboard"])
+    files = [BEST, CHECKPOINT, CURVE, MODEL, RUN, "tensorboard"]
+    assert sorted(path.name for path in folder.iterdir()) == sorted(files)
     assert list((folder / "tensorboard").glob("events.out.tfevents.*"))
     assert load_run(folder) == run
     curve = pd.read_csv(folder / CURVE)
@@ -65,14 +48,13 @@ def test_a_run_leaves_models_settings_curve_and_tensorboard(finished: tuple[Run,
 
 
 def test_the_curve_is_of_the_validation_seeds(finished: tuple[Run, Path]) -> None:
-    """Flown again on these seeds, the last model gives the curve's last line, which has six digits."""
+    """Flown again on these seeds, actor and SB3's model give the curve's best line, which has six digits."""
     run, folder = finished
-    table = evaluate(load_policy(folder, LAST_MODEL), run.scenario, seeds("validation", 4))
-    last = pd.read_csv(folder / CURVE).iloc[-1]
-    assert table["return"].mean() == pytest.approx(last["return"], rel=1e-5)
-    assert table["delta_v_m_s"].mean() == pytest.approx(last["delta_v_m_s"], rel=1e-5)
-    best = evaluate(load_policy(folder), run.scenario, seeds("validation", 4))["return"].mean()
-    assert best == pytest.approx(pd.read_csv(folder / CURVE)["return"].max(), rel=1e-5)
+    best = pd.read_csv(folder / CURVE)["return"].max()
+    model = CLASSES[run.algorithm].load(folder / MODEL, device="cpu")
+    for policy in (load_best(folder)[1], Sb3Policy(model, run.agent.throttle_power)):
+        table = evaluate(policy, run.scenario, seeds("validation", 4))
+        assert table["return"].mean() == pytest.approx(best, rel=1e-5)
 
 
 def test_training_flies_training_seeds_only() -> None:
@@ -92,38 +74,6 @@ def test_equal_seeds_train_equal_models(tmp_path: Path) -> None:
         tables.append(pd.read_csv(tmp_path / name / CURVE).drop(columns="seconds"))
     pd.testing.assert_frame_equal(tables[0], tables[1], check_exact=True)
     assert not tables[0].equals(tables[2])
-
-
-def test_saved_and_loaded_predictions_are_identical(tmp_path: Path) -> None:
-    """A saved network is the same numbers; its outputs are in units of action_scale."""
-    from agents.models import make_model
-    from agents.vec_env import FormationVecEnv
-
-    run = small_run(tmp_path, "ppo")
-    start_run(run, tmp_path / "run")
-    env = FormationVecEnv(run.agent.rows, run.scenario)
-    model = make_model(run.agent, env, seed=0)
-    save_model(model, tmp_path / "run" / MODEL)
-    observations = env.reset()
-    expected, _ = model.predict(observations, deterministic=True)
-    loaded, _ = load_policy(tmp_path / "run").predict(observations)
-    np.testing.assert_array_equal(loaded, np.float32(run.agent.action_scale) * expected)
-    assert loaded.dtype == np.float32
-
-
-def test_a_loaded_policy_flies_one_environment_or_many(finished: tuple[Run, Path]) -> None:
-    """One observation and a batch give the same actions, but for the rounding of float32 sums of other order."""
-    run, folder = finished
-    policy = load_policy(folder)
-    env = FormationEnv(scenario=run.scenario)
-    observations = np.stack([env.reset(seed=seed)[0] for seed in range(5)])
-    batch, state = policy.predict(observations, state="mine")
-    assert batch.shape == (5, 3)
-    assert state == "mine"
-    for observation, action in zip(observations, batch, strict=True):
-        single, _ = policy.predict(observation)
-        assert env.action_space.contains(single)
-        np.testing.assert_allclose(single, action, rtol=0, atol=1e-5)
 
 
 def test_interrupted_saving_leaves_the_old_model(tmp_path: Path) -> None:
@@ -146,26 +96,6 @@ def test_interrupted_saving_leaves_the_old_model(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_ctrl_c_saves_and_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An interrupt in mid-training leaves a model that flies; the command says so and exits like an interrupted one."""
-
-    def interrupt(self: Validation) -> bool:
-        if self.num_timesteps >= 300:
-            raise KeyboardInterrupt
-        return True
-
-    monkeypatch.setattr(Validation, "_on_step", interrupt)
-    small_run(tmp_path, "ppo")
-    options = ["--steps", "512", "--out", str(tmp_path / "run"), "--config", str(tmp_path / "agent.yaml")]
-    result = CliRunner().invoke(app, ["train", "ppo", str(tmp_path / "scenario.yaml"), *options])
-    assert result.exit_code == INTERRUPTED
-    assert "interrupted" in result.stderr
-    assert load_policy(tmp_path / "run", LAST_MODEL).predict(np.zeros(38, np.float32))[0].shape == (3,)
-    again = CliRunner().invoke(app, ["train", "ppo", str(tmp_path / "scenario.yaml"), *options])
-    assert again.exit_code == MISTAKE
-    assert f"error: {tmp_path / 'run'}: holds a run already" in again.stderr
-
-
 def test_shipped_hyperparameters_load_for_every_algorithm() -> None:
     """The shipped files are valid, and each gives its own class."""
     assert isinstance(load_settings("ppo", "keeping"), PPOSettings)
@@ -175,8 +105,10 @@ def test_shipped_hyperparameters_load_for_every_algorithm() -> None:
 def test_a_scenario_may_have_hyperparameters_of_its_own(tmp_path: Path) -> None:
     """An override counts for its scenario alone."""
     path = tmp_path / "ppo.yaml"
-    path.write_text("gamma: 0.9\nscenarios: {mission: {gamma: 0.999}}")
-    assert load_settings("ppo", "mission", path) == PPOSettings(gamma=0.999)
+    path.write_text("gamma: 0.9\nenvironments: {FormationMission-v0: {gamma: 0.999}, bad_communication: {steps: 5}}")
+    for name in ("mission", "FormationMission-v0"):
+        assert load_settings("ppo", name, path) == PPOSettings(gamma=0.999)
+    assert load_settings("ppo", "bad_communication", path) == PPOSettings(gamma=0.9, steps=5)
     assert load_settings("ppo", "keeping", path) == PPOSettings(gamma=0.9)
 
 
@@ -192,10 +124,10 @@ def test_a_scenario_may_have_hyperparameters_of_its_own(tmp_path: Path) -> None:
         ("network: {activation: gelu}", "network.activation:"),
         ("batch_size: 1000", "batch_size: must divide rows * rollout_steps"),
         ("[1, 2]", "(top level): must be a mapping"),
-        ("scenarios: {keping: {}}", "scenarios.keping: no such scenario; did you mean 'keeping'?"),
-        ("scenarios: {keeping: {gama: 1}}", "scenarios.keeping: gama: unknown key"),
-        ("scenarios: {keeping: 3}", "scenarios.keeping: must be a mapping"),
-        ("scenarios: 3", "scenarios: must be a mapping"),
+        ("environments: {keping: {}}", "environments.keping: no such environment; did you mean 'keeping'?"),
+        ("environments: {keeping: {gama: 1}}", "environments.keeping: gama: unknown key"),
+        ("environments: {keeping: 3}", "environments.keeping: must be a mapping"),
+        ("environments: 3", "environments: must be a mapping"),
     ],
 )
 def test_faulty_hyperparameters_are_one_line_with_file_and_key(tmp_path: Path, text: str, fault: str) -> None:
@@ -232,40 +164,18 @@ def test_mistakes_on_the_command_line_are_one_line(tmp_path: Path, arguments: li
 def test_a_folder_without_run_or_model_is_one_line(tmp_path: Path) -> None:
     """What is missing or damaged is named."""
     with pytest.raises(ConfigError, match=r"settings\.json: cannot be read: No such file"):
-        load_policy(tmp_path)
+        load_best(tmp_path)
     start_run(small_run(tmp_path, "ppo"), tmp_path)
-    with pytest.raises(ConfigError, match=r"model\.zip: no such file"):
-        load_policy(tmp_path)
-    (tmp_path / MODEL).write_text("no model")
-    with pytest.raises(ConfigError, match=r"model\.zip: damaged"):
-        load_policy(tmp_path)
+    for content in (None, "no actor"):
+        if content is not None:
+            (tmp_path / BEST).write_text(content)
+        with pytest.raises(ConfigError, match=r"best\.safetensors: cannot be read"):
+            load_best(tmp_path)
     data = json.loads((tmp_path / RUN).read_text())
     data["agent"]["gamma"] = 2
     (tmp_path / RUN).write_text(json.dumps(data))
     with pytest.raises(ConfigError, match=r"settings.json: agent: gamma: must be less than or equal to 1, got 2"):
-        load_policy(tmp_path)
-
-
-def test_the_report_flies_a_model_on_its_own_scenario_only(finished: tuple[Run, Path]) -> None:
-    """An observation is scaled by its scenario, so a model means nothing on another."""
-    run, folder = finished
-    policy = load_policy(folder)
-    factory = learned("mine", [policy])
-    same, other = Scenario(**vars(run.scenario)), Scenario(**{**vars(run.scenario), "process_noise_m_s2": 0.0})
-    assert factory(same, other) is policy
-    assert factory(other, same) is None
-    with pytest.raises(ConfigError, match="mine: two runs were trained on the same scenario"):
-        learned("mine", [policy, load_policy(folder)])
-
-
-def test_models_of_the_report_are_label_and_folder() -> None:
-    """A label may have several runs; it may not hide a classical policy."""
-    assert parse_models(["a=x", "b=y", "a=z=1"]) == {"a": [Path("x"), Path("z=1")], "b": [Path("y")]}
-    for wrong in ("runs/ppo", "=x", "a="):
-        with pytest.raises(ConfigError, match="must be LABEL=FOLDER"):
-            parse_models([wrong])
-    with pytest.raises(ConfigError, match="'zero' is the name of a classical policy"):
-        parse_models(["zero=x"])
+        load_best(tmp_path)
 
 
 def test_the_curve_is_drawn_and_names_what_is_missing(finished: tuple[Run, Path], tmp_path: Path) -> None:

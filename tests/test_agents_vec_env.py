@@ -11,7 +11,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.vec_env import FormationVecEnv
+from agents.vec_env import Sb3VecEnv
 from formation_env import FormationVectorEnv, Scenario, load_scenario
 from formation_env.settings import build
 
@@ -37,7 +37,7 @@ def actions(steps: int) -> np.ndarray:
 
 def test_adapter_hands_on_what_the_batched_environment_gives(scenario: Scenario) -> None:
     """One environment, two faces: equal to the last bit, rewards up to float32, over many ends of both kinds."""
-    adapter, batch = FormationVecEnv(ROWS, scenario), FormationVectorEnv(ROWS, scenario)
+    adapter, batch = Sb3VecEnv(ROWS, scenario), FormationVectorEnv(ROWS, scenario)
     adapter.seed(7)
     np.testing.assert_array_equal(adapter.reset(), batch.reset(seed=7)[0])
     kinds, returns = set(), np.zeros(ROWS)
@@ -63,7 +63,7 @@ def test_adapter_hands_on_what_the_batched_environment_gives(scenario: Scenario)
 def test_episode_statistics_are_those_of_monitor(scenario: Scenario) -> None:
     """SB3's own Monitor, around a single environment with the same seed, is the oracle (it rounds to 1e-6)."""
     single = Monitor(gymnasium.make("FormationKeeping-v0", scenario=scenario))
-    adapter = FormationVecEnv(ROWS, scenario)
+    adapter = Sb3VecEnv(ROWS, scenario)
     adapter.seed(20)
     adapter.reset()
     single.reset(seed=20)
@@ -81,19 +81,25 @@ def test_episode_statistics_are_those_of_monitor(scenario: Scenario) -> None:
     assert ended
 
 
-def test_infos_share_nothing(scenario: Scenario) -> None:
-    """A wrapper may write into a row's info; neither other rows nor later steps may see that."""
-    adapter = FormationVecEnv(ROWS, scenario)
+def test_infos_are_made_for_rows_that_end_only(scenario: Scenario) -> None:
+    """No work per row: one list for all steps, in which an ended row's info stands for one step and is its own."""
+    adapter = Sb3VecEnv(ROWS, scenario)
+    adapter.seed(7)
     adapter.reset()
-    first = adapter.step(actions(1)[0])[3]
-    first[0]["mark"] = 1
-    assert "mark" not in first[1]
-    assert "mark" not in adapter.step(actions(1)[0])[3][0]
+    first, told = adapter.step(actions(1)[0])[3], set()
+    for action in actions(2 * scenario.num_steps):
+        dones, infos = adapter.step(action)[2:]
+        assert infos is first
+        assert [bool(info) for info in infos] == dones.tolist()
+        ended = [id(info) for info in infos if info]
+        assert len(set(ended)) == len(ended)
+        told |= set(ended)
+    assert told
 
 
 def test_reward_scale_is_a_factor_and_leaves_the_statistics(scenario: Scenario) -> None:
     """What is learnt from is scaled, what is reported is in m/s."""
-    plain, scaled = FormationVecEnv(ROWS, scenario), FormationVecEnv(ROWS, scenario, reward_scale=8.0)
+    plain, scaled = Sb3VecEnv(ROWS, scenario), Sb3VecEnv(ROWS, scenario, reward_scale=8.0)
     for env in (plain, scaled):
         env.seed(3)
         env.reset()
@@ -105,19 +111,21 @@ def test_reward_scale_is_a_factor_and_leaves_the_statistics(scenario: Scenario) 
         ]
 
 
-def test_actions_are_in_units_of_the_action_scale(scenario: Scenario) -> None:
-    """An action of a scaled adapter is that share of it to the batched environment (a quarter: no rounding)."""
-    adapter, batch = FormationVecEnv(ROWS, scenario, action_scale=0.25), FormationVectorEnv(ROWS, scenario)
+def test_actions_are_throttles(scenario: Scenario) -> None:
+    """An action of the adapter is its power with its sign to the batched environment (powers of two: no rounding)."""
+    adapter, batch = Sb3VecEnv(ROWS, scenario, throttle_power=3.0), FormationVectorEnv(ROWS, scenario)
     adapter.seed(9)
     adapter.reset()
     batch.reset(seed=9)
-    for action in actions(10):
-        np.testing.assert_array_equal(adapter.step(action)[0], batch.step(0.25 * action)[0])
+    throttles = np.tile(np.array([[-1, 0.5, 0], [1, -0.25, 0.125]], np.float32), (3, 1))[:ROWS]
+    thrusts = np.tile(np.array([[-1, 0.125, 0], [1, -(2.0**-6), 2.0**-9]], np.float32), (3, 1))[:ROWS]
+    for _ in range(10):
+        np.testing.assert_array_equal(adapter.step(throttles)[0], batch.step(thrusts)[0])
 
 
 def test_seeds_and_options_count_once(scenario: Scenario) -> None:
     """As in SB3's own vectorised environments: equal seeds, equal episodes; the next reset goes on with the stream."""
-    adapter = FormationVecEnv(ROWS, scenario)
+    adapter = Sb3VecEnv(ROWS, scenario)
     adapter.seed(11)
     first, second = adapter.reset(), adapter.reset()
     adapter.seed(11)
@@ -137,7 +145,7 @@ def test_seeds_and_options_count_once(scenario: Scenario) -> None:
 def test_staggered_rows_end_at_different_times() -> None:
     """With no early ends, rows begun evenly over an episode of N steps end evenly over N steps, and go on so."""
     scenario = short_scenario(limits={"max_distance_m": 50e3})
-    adapter = FormationVecEnv(ROWS, scenario, stagger=True)
+    adapter = Sb3VecEnv(ROWS, scenario, stagger=True)
     adapter.seed(5)
     adapter.reset()
     coast = np.zeros((ROWS, 3), np.float32)
@@ -151,7 +159,7 @@ def test_staggered_rows_end_at_different_times() -> None:
 
 def test_attributes_and_methods_of_the_shared_environment(scenario: Scenario) -> None:
     """The rows share one environment: reading is for any of them, changing only for all."""
-    adapter = FormationVecEnv(ROWS, scenario)
+    adapter = Sb3VecEnv(ROWS, scenario)
     assert adapter.get_attr("scenario", [0, 2]) == [scenario] * 2
     assert not adapter.has_attr("no_such_thing")
     adapter.set_attr("render_mode", None)
@@ -166,12 +174,44 @@ def test_attributes_and_methods_of_the_shared_environment(scenario: Scenario) ->
 
 def test_stable_baselines_wrappers_and_evaluation_take_the_adapter(scenario: Scenario) -> None:
     """VecNormalize runs on it, and evaluate_policy finds the statistics without a warning."""
-    env = VecNormalize(FormationVecEnv(ROWS, scenario), norm_obs=False)
+    env = VecNormalize(Sb3VecEnv(ROWS, scenario), norm_obs=False)
     model = PPO("MlpPolicy", env, n_steps=8, batch_size=20, n_epochs=1, seed=0, device="cpu")
     model.learn(2 * 8 * ROWS)
-    returns, lengths = evaluate_policy(model, FormationVecEnv(3, scenario), 6, return_episode_rewards=True)
+    returns, lengths = evaluate_policy(model, Sb3VecEnv(3, scenario), 6, return_episode_rewards=True)
     assert len(returns) == 6
     assert max(lengths) <= scenario.num_steps
+
+
+def test_rollouts_are_those_of_stable_baselines_own_vectorised_environment() -> None:
+    """`make_vec_env` with the same seeds is the oracle: equal to the last bit, ends, last observations and returns."""
+    rows = 3
+    plain, adapter = make_vec_env("FormationKeeping-v0", n_envs=rows, seed=4), Sb3VecEnv(rows, "FormationKeeping-v0")
+    adapter.seed(4)
+    np.testing.assert_array_equal(adapter.reset(), plain.reset())
+    noise, ends = np.random.default_rng(2), 0
+    for _ in range(2 * load_scenario("keeping").num_steps + 1):
+        action = noise.normal(0, 0.01, (rows, 3)).astype(np.float32)
+        ours, theirs = adapter.step(action), plain.step(action)
+        for one, other in zip(ours[:3], theirs[:3], strict=True):
+            np.testing.assert_array_equal(one, other)
+        for one, other in zip(ours[3], theirs[3], strict=True):
+            if "episode" in other:
+                ends += 1
+                np.testing.assert_array_equal(one["terminal_observation"], other["terminal_observation"])
+                assert one["TimeLimit.truncated"] == other["TimeLimit.truncated"]
+                assert one["episode"]["r"] == pytest.approx(other["episode"]["r"], abs=1e-6)  # Monitor rounds
+                assert one["episode"]["l"] == other["episode"]["l"]
+    assert ends == 2 * rows
+
+
+def test_an_end_that_is_one_leaves_no_value_behind(scenario: Scenario) -> None:
+    """With bootstrap_end off, SB3 must not add the value of the last observation, whatever the end."""
+    adapter = Sb3VecEnv(ROWS, scenario, bootstrap_end=False)
+    adapter.seed(7)
+    adapter.reset()
+    told = [info["TimeLimit.truncated"] for action in actions(80) for info in adapter.step(action)[3] if info]
+    assert len(told) > ROWS
+    assert not any(told)
 
 
 def test_stable_baselines_own_vectorised_environment_works() -> None:
@@ -181,3 +221,16 @@ def test_stable_baselines_own_vectorised_environment_works() -> None:
     action, _ = model.predict(env.reset())
     assert action.shape == (2, 3)
     assert load_scenario("keeping") == env.get_attr("unwrapped")[0].scenario
+
+
+def test_rows_go_on_from_what_they_remember(scenario: Scenario) -> None:
+    """Put back in another environment, rows fly the same to the last bit, over ends and the episodes after them."""
+    one, other = Sb3VecEnv(ROWS, scenario), Sb3VecEnv(ROWS, scenario)
+    one.seed(8)
+    one.reset()
+    for action in actions(7):
+        observations = one.step(action)[0]
+    other.recall(one.memory(), observations)
+    for action in actions(50):
+        for mine, theirs in zip(one.step(action)[:3], other.step(action)[:3], strict=True):
+            np.testing.assert_array_equal(mine, theirs)

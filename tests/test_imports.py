@@ -148,6 +148,18 @@ def test_learning_libraries_stay_out(owner: str) -> None:
     assert wrong == []
 
 
+def test_learned_policies_fly_without_learning_libraries() -> None:
+    """Whatever the command line, the report, the shipped policies and their evaluation import, directly or not."""
+    needed, found = {"agents.__main__", "agents.report", "agents.shipped", "agents.evaluate"}, set()
+    while needed:
+        module = needed.pop()
+        found.add(module)
+        parents = {module.rpartition(".")[0]} - {""}
+        needed |= ({item.target for item in IMPORTS if item.source == module and not item.lazy} | parents) - found
+    assert {"agents.actor", "agents", "baselines.report"} <= found
+    assert {package(module) for module in found} & (LEARNING | {"onnx"}) == set()
+
+
 def test_plotting_is_loaded_by_those_who_plot() -> None:
     """matplotlib and plotly: inside functions, or in rendering and report modules, themselves loaded in functions."""
     wrong = [

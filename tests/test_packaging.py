@@ -28,7 +28,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_wheel_holds_the_packages_and_the_settings(wheel: Path) -> None:
-    """Every YAML file of configs/ lies inside the package; the types are marked; the tests stay at home."""
+    """Every YAML file of configs/ and every policy lies inside; the types are marked; the tests stay at home."""
     names = set(zipfile.ZipFile(wheel).namelist())
     settings = {path.relative_to(ROOT).as_posix() for path in (ROOT / "configs").rglob("*.yaml")}
     assert any(name.startswith("configs/scenarios/") for name in settings)
@@ -37,6 +37,8 @@ def test_wheel_holds_the_packages_and_the_settings(wheel: Path) -> None:
         assert f"{package}/py.typed" in names
         modules = {path.relative_to(ROOT).as_posix() for path in (ROOT / package).rglob("*.py")}
         assert modules <= names
+    policies = {path.relative_to(ROOT).as_posix() for path in (ROOT / "agents" / "policies").rglob("*.*")}
+    assert policies <= names
     assert not any(name.startswith(("tests/", "configs/")) or "__pycache__" in name for name in names)
 
 

@@ -87,6 +87,14 @@ class Simulation:
             self._lane_set,
         )
 
+    def memory(self) -> Array:
+        """All that the rows carry from step to step, random streams included: a copy, for `recall`."""
+        return self._states.copy()
+
+    def recall(self, memory: Array) -> None:
+        """Put the rows back to where they were when `memory` gave this."""
+        self._states[:] = memory
+
     def new_observations(self) -> NDArray[np.float32]:
         """An array for the observations of all rows."""
         return np.empty((self.num_rows, observation.SIZE), np.float32)

@@ -1,0 +1,1 @@
+"""Training without Stable-Baselines3: to read, to run, and to copy from."""

@@ -1,0 +1,141 @@
+"""From a scenario to an actor that flies it, without reinforcement learning: a clone, improved by the gradient."""
+
+import copy
+import itertools
+import math
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+import torch
+from torch import nn
+
+from agents.actor import Actor, Functions
+from agents.models import ACTIVATIONS
+from agents.pretraining.gradient import ModelEpisodes, Output
+from agents.pretraining.imitation import imitate
+from agents.pretraining.recording import record_disturbances
+from agents.settings import Network, Pretraining
+from baselines import make_policy
+from formation_env.evaluation import evaluate
+from formation_env.observation import SIZE
+from formation_env.scenario import Scenario
+from formation_env.seeds import seeds
+
+UPDATES_A_JUDGEMENT: Final = 50
+"""After so many the network flies the validation seeds; the best one is kept."""
+_WARM_UP: Final = 20
+_MAX_NORM: Final = 1.0
+_FIRST_SEED: Final = 500_000
+"""Of the training split: far behind those that reinforcement learning begins with."""
+_FIRST_OUTPUT: Final = 0.1
+"""Factor of the last layer's first weights: a new network hardly thrusts."""
+
+
+def pretrain(
+    how: Pretraining,
+    network: Network,
+    functions: Functions,
+    scenario: Scenario,
+    seed: int,
+    validation_episodes: int = 64,
+    progress: Callable[[str], Any] = lambda text: None,
+) -> Actor:
+    """The actor of least validation cost on the way.
+
+    Args:
+        how: what is done.
+        network: its layers.
+        functions: what stands between and behind them.
+        scenario: what is flown.
+        seed: of weights, samples and episodes.
+        validation_episodes: on which the best is chosen.
+        progress: told what has just been reached.
+
+    Raises:
+        ConfigError: no teacher of that name, or a nonlinear truth where the gradient is wanted.
+    """
+    generator, output = np.random.default_rng(seed), Output(functions.squash, functions.throttle_power)
+    net = _network(network, seed)
+    episodes = _training_seeds(how, seed)
+    best, least = copy.deepcopy(net), math.inf
+
+    def judge(text: str) -> None:
+        nonlocal best, least
+        actor = _actor(net, functions, scenario)
+        cost = -float(evaluate(actor, scenario, seeds("validation", validation_episodes))["return"].mean())
+        progress(f"{text}: {cost:.4f} m/s on {validation_episodes} validation seeds")
+        if cost < least:
+            best, least = copy.deepcopy(net), cost
+
+    if how.rounds:
+        teacher = make_policy(how.teacher, scenario)
+        rounds = [episodes[how.rows * i : how.rows * (i + 1)] for i in range(how.rounds)]
+        imitate(net, output, teacher, scenario, rounds, functions.magnification, generator)
+        judge(f"after imitating {how.teacher}")
+    if how.updates:
+        recorded = episodes[how.rows * how.rounds :]
+        model = ModelEpisodes(record_disturbances(scenario, recorded), functions.magnification)
+        descend(net, output, model, how, generator, judge)
+    return _actor(best, functions, scenario)
+
+
+def descend(
+    net: nn.Module,
+    output: Output,
+    model: ModelEpisodes,
+    how: Pretraining,
+    generator: np.random.Generator,
+    judge: Callable[[str], Any],
+) -> None:
+    """Follow the cost's gradient through the model.
+
+    Args:
+        net: from features to outputs; changed in place.
+        output: what the outputs stand for.
+        model: the episodes.
+        how: how many updates, of which size.
+        generator: chooses the episodes of each.
+        judge: called with a text from time to time, and at the end.
+    """
+    optimizer = torch.optim.Adam(net.parameters(), how.learning_rate)
+    schedule = torch.optim.lr_scheduler.LambdaLR(
+        optimizer, lambda k: min(1.0, (k + 1) / _WARM_UP) * (0.505 + 0.495 * math.cos(math.pi * k / how.updates))
+    )
+    for update in range(1, how.updates + 1):
+        rows = torch.as_tensor(generator.choice(model.rows, min(how.batch, model.rows), replace=False))
+        cost = model.cost(net, output, rows)
+        optimizer.zero_grad()
+        cost.backward()
+        nn.utils.clip_grad_norm_(net.parameters(), _MAX_NORM)
+        optimizer.step()
+        schedule.step()
+        if update % UPDATES_A_JUDGEMENT == 0 or update == how.updates:
+            judge(f"after {update} updates through the model")
+
+
+def _network(network: Network, seed: int) -> nn.Sequential:
+    """A new network from features to outputs."""
+    widths, layers = [SIZE, *network.hidden], list[nn.Module]()
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(seed)
+        for inside, outside in itertools.pairwise(widths):
+            layers += [nn.Linear(inside, outside), ACTIVATIONS[network.activation]()]
+        last = nn.Linear(widths[-1], 3)
+    with torch.no_grad():
+        last.weight.mul_(_FIRST_OUTPUT)
+        last.bias.zero_()
+    return nn.Sequential(*layers, last)
+
+
+def _actor(net: nn.Sequential, functions: Functions, scenario: Scenario) -> Actor:
+    """The network as it is now, without torch."""
+    linear = [layer for layer in net if isinstance(layer, nn.Linear)]
+    layers = [(layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy()) for layer in linear]
+    return Actor(layers, functions, scenario)
+
+
+def _training_seeds(how: Pretraining, seed: int) -> range:
+    """Episodes of imitation and, behind them, of the gradient; others for each seed."""
+    count = how.rows * how.rounds + how.episodes
+    return seeds("training", _FIRST_SEED + (seed + 1) * count)[-count:]
