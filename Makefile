@@ -20,11 +20,11 @@ INSTALL = $(PY) -m pip install --quiet -c constraints.txt -e
 help: ## Show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-report: $(REPORT) ## Classical baselines on the four environments (EPISODES=100 OUT=reports/)
-	$(PY) -m baselines report --episodes $(EPISODES) --out $(OUT) $(ARGS)
+report: $(REPORT) ## Learned and classical policies on the four environments (EPISODES=100 OUT=reports/)
+	$(PY) -m agents report --episodes $(EPISODES) --out $(OUT) $(ARGS)
 
 report-full: $(REPORT) ## The same with all seeds for mpc, too, and finer fronts; goes on where it was interrupted
-	$(PY) -m baselines report --episodes $(EPISODES) --slow-episodes $(EPISODES) --sweep-episodes 50 --bound-episodes 20 \
+	$(PY) -m agents report --episodes $(EPISODES) --slow-episodes $(EPISODES) --sweep-episodes 50 --bound-episodes 20 \
 		--fine --resume --out $(OUT)
 
 thesis: $(REPORT) ## The source thesis's figures and claims, reproduced (OUT=reports/): OUT/thesis/thesis.html
