@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, NoReturn
 import typer
 
 from baselines.factories import classical
-from baselines.registry import FLOORS, POLICIES, SLOW
+from baselines.registry import FLOORS, SLOW
 from formation_env.envs import ENV_IDS
 from formation_env.settings import ConfigError
 
@@ -86,7 +86,7 @@ def sweep(
     """Draw thrust against error as its price moves, and cost against noise, outages, limits and wrong models."""
     command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
     envs = [*(scenarios or ()), *(env or ())] or list(ENV_IDS)
-    names = policy or [name for name in POLICIES if name not in (*SLOW, *FLOORS)]
+    names = policy or [name for name in classical() if name not in (*SLOW, *FLOORS)]
 
     def write() -> Path:
         from baselines.sweep.report import Wanted, write_sweep

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from baselines.policy import AccelerationPolicy
-from baselines.registry import POLICIES, SLOW, gains_path, make_policy, policy_class, read_gains
+from baselines.registry import PLANNING, POLICIES, gains_path, make_policy, policy_class, read_gains
 from formation_env.evaluation import Policy
 from formation_env.scenario import Scenario
 
@@ -63,12 +63,12 @@ def classical(names: Sequence[str] = ()) -> dict[str, Classical]:
     """Factories of classical policies, each once.
 
     Args:
-        names: of the policies; by default all, but for the slow ones where their solver is not installed.
+        names: of the policies; by default all, but for those that plan where their solver is not installed.
 
     Raises:
         ConfigError: there is none of a name.
     """
-    chosen = names or [name for name in POLICIES if name not in SLOW or find_spec("clarabel")]
+    chosen = names or [name for name in POLICIES if name not in PLANNING or find_spec("clarabel")]
     return {name: Classical(name) for name in chosen}
 
 

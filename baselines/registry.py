@@ -9,6 +9,7 @@ from baselines.deadband import Deadband
 from baselines.floors import Random, Zero
 from baselines.lqr import LQR
 from baselines.lqr_finite import LQRFinite
+from baselines.lqr_planned import LQRPlanned
 from baselines.lqr_tracking import LQRTracking
 from baselines.mpc import MPC
 from baselines.policy import AccelerationPolicy
@@ -21,6 +22,7 @@ from formation_env.settings import ConfigError, build, load_yaml, nearest
 
 POLICIES: Final[dict[str, type[Any]]] = {
     "lqr": LQR,
+    "lqr_planned": LQRPlanned,
     "mpc": MPC,
     "lqr_finite": LQRFinite,
     "lqr_tracking": LQRTracking,
@@ -31,6 +33,8 @@ POLICIES: Final[dict[str, type[Any]]] = {
     "random": Random,
 }
 """Classes made with (scenario, gains), the gains being of the class's `Settings`."""
+PLANNING: Final = ("mpc", "lqr_planned")
+"""Those that need a solver of cone programs, of the extra `optimal`."""
 SLOW: Final = ("mpc",)
 """Those that solve a program at each step: a hundred times as long as the others."""
 FLOORS: Final = ("zero", "random")

@@ -62,6 +62,7 @@ KNOBS: Final[dict[str, tuple[Knob, ...]]] = {
         Knob(("expected_cost.price_scale",), 0.3, 3),
         Knob(("deadband",), 0, 1, log=False),
     ),
+    "lqr_planned": (Knob(("expected_cost.floor",), 1e-5, 1e-2), Knob(("expected_cost.price_scale",), 0.3, 3)),
     "lqr_finite": (*_regulator("transfer", transfer=True), *_regulator("hold", transfer=False)),
     "lqr_tracking": (*_regulator("transfer", transfer=True), *_regulator("hold", transfer=False)),
     "smc": (
