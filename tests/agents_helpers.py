@@ -3,8 +3,15 @@
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from typer.testing import CliRunner
+
+from agents.__main__ import MISTAKE, app
+from agents.actor import Actor, Functions
 from agents.plan import plan_run
 from agents.runs import Run
+from formation_env import load_scenario
+from formation_env.observation import SIZE
 
 SCENARIO = """
 spacecraft: {max_accel_m_s2: 0.002}
@@ -32,3 +39,19 @@ def small_run(folder: Path, algorithm: str, agent: str = "", **changes: Any) -> 
     (folder / "agent.yaml").write_text(SMALL[algorithm] + agent)
     given = {"steps": 512, "validations": 2, "validation_episodes": 4, "config": folder / "agent.yaml", "threads": 1}
     return plan_run(algorithm, **({"env": str(folder / "scenario.yaml")} | given | changes))
+
+
+def random_actor(squash: str, activation: str = "tanh", power: float = 2.0, width: int = 8) -> Actor:
+    """An actor of the size of `small_run`'s networks, with thrusts on all axes."""
+    rng = np.random.default_rng(5)
+    shapes = ((width, SIZE), (3, width))
+    layers = [tuple(rng.normal(0, 0.3, size).astype(np.float32) for size in (shape, shape[:1])) for shape in shapes]
+    return Actor(layers, Functions(activation, squash, power, 50.0), load_scenario("keeping"))
+
+
+def assert_refused(arguments: list[str], fault: str) -> None:
+    """The command says so in one line."""
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == MISTAKE
+    assert fault in result.stderr
+    assert result.stderr.count("\n") == 1

@@ -2,32 +2,23 @@
 
 import re
 import signal
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pandas as pd
 import pytest
 import torch
-from agents_helpers import small_run
+from agents_helpers import assert_refused, random_actor, small_run
 from safetensors.torch import load_file
 from typer.testing import CliRunner
 
 from agents.__main__ import INTERRUPTED, MISTAKE, app
-from agents.actor import Actor, Functions, to_bytes
+from agents.actor import to_bytes
 from agents.checkpoint import load_checkpoint
-from agents.convert import actor_of
-from agents.models import make_env, make_model
 from agents.plan import default_folder
-from agents.runs import BEST, CHECKPOINT, CURVE, RUN, START, Run, load_run, start_run
-from agents.shaping import Shaping
-from agents.start import start_from
+from agents.runs import BEST, CHECKPOINT, CURVE, RUN, start_run
 from agents.train import resume, train
 from agents.validation import Validation
-from agents.vec_env import Sb3VecEnv
-from formation_env import ConfigError, load_scenario
-from formation_env.observation import SIZE
-from formation_env.schedule import observation_layout
+from formation_env import ConfigError
 
 
 class KilledError(Exception):
@@ -169,153 +160,6 @@ def test_what_cannot_be_resumed_is_one_line(tmp_path: Path) -> None:
     for content in (b"", b"no checkpoint"):
         (tmp_path / "run" / CHECKPOINT).write_bytes(content)
         assert_refused(["train", "--resume", str(tmp_path / "run")], f"{CHECKPOINT}: damaged, or no checkpoint")
-
-
-def assert_refused(arguments: list[str], fault: str) -> None:
-    """The command says so in one line."""
-    result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == MISTAKE
-    assert fault in result.stderr
-    assert result.stderr.count("\n") == 1
-
-
-def random_actor(squash: str, activation: str = "tanh", power: float = 2.0, width: int = 8) -> Actor:
-    """An actor of the size of `small_run`'s networks, with thrusts on all axes."""
-    rng = np.random.default_rng(5)
-    shapes = ((width, SIZE), (3, width))
-    layers = [tuple(rng.normal(0, 0.3, size).astype(np.float32) for size in (shape, shape[:1])) for shape in shapes]
-    return Actor(layers, Functions(activation, squash, power, 50.0), load_scenario("keeping"))
-
-
-@pytest.mark.parametrize(
-    ("algorithm", "squash", "activation", "agent"),
-    [
-        ("ppo", "clip", "tanh", ""),
-        ("ppo", "clip", "tanh", "use_sde: true"),
-        ("sac", "tanh", "relu", ""),
-        ("sac", "tanh", "relu", "use_sde: true"),
-    ],
-)
-def test_a_start_flies_as_the_file_says(
-    algorithm: str, squash: str, activation: str, agent: str, tmp_path: Path
-) -> None:
-    """The first deterministic actions are those of the file; noise and critics are the seed's, as without it."""
-    run = small_run(tmp_path, algorithm, agent)
-    run = replace(run, agent=replace(run.agent, network=replace(run.agent.network, activation=activation)))
-    path = tmp_path / "actor.safetensors"
-    path.write_bytes(to_bytes(given := random_actor(squash, activation)))
-    env = make_env(run.agent, run.scenario)
-    fresh, started = make_model(run.agent, env, 0), make_model(run.agent, env, 0)
-    start_from(path, started, run.agent, run.scenario)
-    observations = np.random.default_rng(0).normal(0, 1, (50, SIZE)).astype(np.float32)
-    expected = given.predict(observations)[0]
-    z = started.predict(observations, deterministic=True)[0]
-    np.testing.assert_allclose(np.sign(z) * np.abs(z) ** 2, expected, rtol=0, atol=3e-6)  # float32 sums
-    np.testing.assert_array_equal(actor_of(started, 2.0, run.scenario).predict(observations)[0], expected)
-    actor_parts = ("policy_net", "action_net", "actor.latent_pi", "actor.mu")
-    for name, tensor in started.policy.state_dict().items():
-        assert torch.equal(tensor, fresh.policy.state_dict()[name]) != any(part in name for part in actor_parts), name
-
-
-@pytest.mark.parametrize(
-    ("actor", "fault"),
-    [
-        (random_actor("clip", width=9), "hidden: must be [8], by algorithm and hyperparameters, got [9]"),
-        (
-            random_actor("clip", activation="relu"),
-            "activation: must be tanh",
-        ),
-        (random_actor("tanh"), "squash: must be clip"),
-        (random_actor("clip", power=3.0), "throttle_power: must be 2.0"),
-        (None, "cannot be read"),
-    ],
-)
-def test_a_start_that_does_not_fit_is_one_line(tmp_path: Path, actor: Actor | None, fault: str) -> None:
-    """It names the file and what is wrong, and no folder is left."""
-    run, path = small_run(tmp_path, "ppo"), tmp_path / "actor.safetensors"
-    if actor is not None:
-        path.write_bytes(to_bytes(actor))
-    command = ["train", "ppo", run.env, "--config", str(tmp_path / "agent.yaml"), "--start", str(path)]
-    assert_refused([*command, "--steps", "100", "--out", str(tmp_path / "run")], fault)
-    assert not (tmp_path / "run").exists()
-
-
-def test_a_run_from_a_start_is_noted_with_it(tmp_path: Path) -> None:
-    """The curve begins with the file's actor, of which the run keeps a copy; and learning changes it."""
-    path = tmp_path / "actor.safetensors"
-    path.write_bytes(to_bytes(random_actor("clip")))
-    run = small_run(tmp_path, "ppo", start=path)
-    train(run, tmp_path / "run")
-    assert (tmp_path / "run" / START).read_bytes() == path.read_bytes()
-    assert load_run(tmp_path / "run").start == str(path)
-    last = load_checkpoint(tmp_path / "run" / CHECKPOINT)["parameters"]["policy"]
-    assert not np.array_equal(last["action_net.weight"].numpy(), random_actor("clip").layers[-1][0])
-
-
-def learnt(run: Run, folder: Path) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
-    """A run's network before and after."""
-    before = make_model(run.agent, make_env(run.agent, run.scenario), run.seed).policy.state_dict()
-    train(run, folder)
-    return before, load_checkpoint(folder / CHECKPOINT)["parameters"]["policy"]
-
-
-@pytest.mark.parametrize(
-    ("algorithm", "agent", "actor"),
-    [
-        ("ppo", "warmup_rollouts: 4", ("policy_net", "action_net", "log_std")),
-        ("sac", "actor_delay_steps: 512", ("actor.",)),
-    ],
-)
-def test_while_the_critic_warms_up_the_actor_stays(
-    algorithm: str, agent: str, actor: tuple[str, ...], tmp_path: Path
-) -> None:
-    """512 steps are 4 rollouts of 8 rows and 16 steps: in the 512 steps that follow the actor learns, too."""
-    for steps, moves in ((512, False), (1024, True)):
-        before, after = learnt(small_run(tmp_path, algorithm, agent, steps=steps), tmp_path / str(steps))
-        for name, tensor in after.items():
-            part = any(part in name for part in actor)
-            assert torch.equal(tensor, before[name]) == (part and not moves), name
-
-
-def test_exploration_does_not_fall_below_its_limit(tmp_path: Path) -> None:
-    """Begun below the limit, the noise is at it or above after the first update."""
-    run = small_run(tmp_path, "ppo", "log_std_init: -4.0\nlog_std_min: -2.0", steps=128)
-    before, after = learnt(run, tmp_path / "run")
-    assert (before["log_std"] == -4).all()
-    assert (after["log_std"] == -2).all()
-
-
-@pytest.mark.parametrize("bootstrap_end", [False, True])
-def test_shaping_adds_nothing_but_the_potential_of_the_start(bootstrap_end: bool, tmp_path: Path) -> None:
-    """Ng, Harada & Russell (1999): discounted, what is added sums to -Phi(start), whatever is flown.
-
-    With the value of the last observation behind the end, gamma^T Phi(last) is left over: it is taken off that value.
-    The oracle is the unshaped environment, and the potential taken from the layout's `arrival_error`.
-    """
-    gamma, weight, rows = 0.9, 0.02, 4
-    scenario = small_run(tmp_path, "ppo").scenario
-    shaped = Sb3VecEnv(rows, scenario, shaping=Shaping(scenario, weight, gamma), bootstrap_end=bootstrap_end)
-    plain = Sb3VecEnv(rows, scenario, bootstrap_end=bootstrap_end)
-    noise = np.random.default_rng(3)
-    for env in (plain, shaped):
-        env.seed(6)
-    starts, added, returns = shaped.reset(), np.zeros(rows), []
-    plain.reset()
-    for step in range(scenario.num_steps):
-        action = noise.uniform(-0.3, 0.3, (rows, 3)).astype(np.float32)
-        one, other = plain.step(action), shaped.step(action)
-        added += gamma**step * (other[1].astype(float) - one[1])
-        returns = [(a["episode"]["r"], b["episode"]["r"]) for a, b in zip(one[3], other[3], strict=True) if a]
-    assert len(returns) == rows
-    assert all(a == b for a, b in returns), "the reported return is never shaped"
-    lasts = np.stack([info["terminal_observation"] for info in other[3]])
-    layout = observation_layout(scenario)
-    phi, last = (
-        -weight * np.linalg.norm(layout.state(seen, "arrival_error")[:, :3], axis=1) for seen in (starts, lasts)
-    )
-    assert (phi < -0.1).all()
-    left = gamma**scenario.num_steps * last if bootstrap_end else 0.0
-    np.testing.assert_allclose(added, left - phi, rtol=1e-4)  # rewards are float32
 
 
 def test_runs_have_a_folder_and_steps_of_their_own(tmp_path: Path) -> None:
