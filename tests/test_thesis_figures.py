@@ -243,7 +243,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, flown: dict[str, Flights]) 
     """All files of those flights."""
     out = tmp_path_factory.mktemp("thesis") / "deep" / "folder"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report, "fly", lambda wanted, workers: flown)
+        patch.setattr(report.jobs, "fly", lambda wanted, workers: flown)
         patch.setattr(claims, "tables", lambda flown, effort: TABLES)
         page = report.write_thesis(out, report.Wanted(2, COARSE_S, 2.3, models=False), "the <command>", 1)
     assert page == out / report.PAGE
@@ -310,7 +310,7 @@ def test_a_failure_leaves_the_old_files(folder: Path, monkeypatch: pytest.Monkey
         raise RuntimeError("no ink")
 
     monkeypatch.setitem(FIGURES, "5.27", replace(FIGURES["5.27"], draw=broken))
-    monkeypatch.setattr(report, "fly", lambda wanted, workers: {})
+    monkeypatch.setattr(report.jobs, "fly", lambda wanted, workers: {})
     for number in list(FIGURES)[:-1]:
         monkeypatch.delitem(FIGURES, number)
     with pytest.raises(RuntimeError, match="no ink"):
