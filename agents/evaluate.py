@@ -14,6 +14,7 @@ from agents.runs import load_best
 from agents.shipped import load_policy
 from agents.throttle import throttle
 from baselines import fuel_optimal, regret
+from baselines.registry import SOLVER
 from formation_env.dynamics import NONLINEAR
 from formation_env.evaluation import Policy, evaluate, scenario_of, summarise
 from formation_env.observation import SIZE
@@ -23,7 +24,6 @@ from formation_env.settings import ConfigError
 
 ALGORITHMS: Final = {"clip_range": "PPO", "target_entropy": "SAC", "policy_delay": "TD3"}
 """SB3's algorithms by a setting that no other has."""
-SOLVER: Final = "clarabel"
 
 
 class Sb3Policy:

@@ -14,7 +14,7 @@ from agents.actor import Actor, read_actor
 from agents.settings import SETTINGS, AgentSettings, Algorithm
 from formation_env.files import replacing, write_files
 from formation_env.scenario import Scenario
-from formation_env.settings import ConfigError, Text, build, settings
+from formation_env.settings import ConfigError, Text, build, load_json, settings
 
 MODEL: Final = "model.zip"
 """The model that was best on the validation seeds, as Stable-Baselines3 saves it."""
@@ -100,12 +100,7 @@ def load_run(folder: Path) -> Run:
         ConfigError: no run is there, or its settings are wrong; one line.
     """
     path = folder / RUN
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValueError as error:
-        raise ConfigError(f"{path}: no valid JSON: {error}") from None
+    data = load_json(path)
     if isinstance(data, dict) and data.get("algorithm") in SETTINGS:
         data["agent"] = build(SETTINGS[data["algorithm"]], data.get("agent"), f"{path}: agent")
     return build(Run, data, str(path))

@@ -1,7 +1,6 @@
 """Policies that come with the package: their files, their cards, and how they are loaded. No torch, no pickle."""
 
 import hashlib
-import json
 import re
 from dataclasses import fields
 from pathlib import Path
@@ -12,7 +11,7 @@ from formation_env.envs import ENV_IDS
 from formation_env.evaluation import scenario_of
 from formation_env.observation import SIZE
 from formation_env.scenario import Scenario, scenario_names
-from formation_env.settings import ConfigError, Real, Text, build, nearest, settings
+from formation_env.settings import ConfigError, Real, Text, build, load_json, nearest, settings
 
 SHIPPED: Final = Path(__file__).parent / "policies"
 """Folder of `ALGORITHM_SCENARIO.safetensors`, each with its card (.json) and the same network as ONNX graph (.onnx)."""
@@ -160,13 +159,7 @@ def read_card(path: Path) -> Card:
     Raises:
         ConfigError: it is missing or faulty.
     """
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValueError as error:
-        raise ConfigError(f"{path}: no valid JSON: {error}") from None
-    return build(Card, data, str(path))
+    return build(Card, load_json(path), str(path))
 
 
 def _check_env(path: Path, card: Card) -> None:

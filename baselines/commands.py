@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, NoReturn
 import typer
 
 from baselines.factories import classical
-from baselines.registry import FLOORS, SLOW
+from baselines.registry import FLOORS, SLOW, SOLVER
 from formation_env.envs import ENV_IDS
 from formation_env.settings import ConfigError
 
@@ -115,7 +115,7 @@ def run_report(name: str, out: Path, write: Callable[[], Path]) -> None:
         _end(f"{name}: interrupted, no report written", 130)
     except ModuleNotFoundError as error:
         missing = str(error.name).split(".")[0]
-        extra = "optimal" if missing == "clarabel" else "report"
+        extra = "optimal" if missing == SOLVER else "report"
         _end(f"{name}: needs {missing}; install it with: pip install 'formation-env[{extra}]'", 1)
     except ConfigError as error:
         _end(str(error), 2)

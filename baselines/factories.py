@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from baselines.policy import AccelerationPolicy
-from baselines.registry import PLANNING, POLICIES, gains_path, make_policy, policy_class, read_gains
+from baselines.registry import PLANNING, POLICIES, SOLVER, gains_path, make_policy, policy_class, read_gains
 from formation_env.evaluation import Policy
 from formation_env.scenario import Scenario
 
@@ -68,7 +68,7 @@ def classical(names: Sequence[str] = ()) -> dict[str, Classical]:
     Raises:
         ConfigError: there is none of a name.
     """
-    chosen = names or [name for name in POLICIES if name not in PLANNING or find_spec("clarabel")]
+    chosen = names or [name for name in POLICIES if name not in PLANNING or find_spec(SOLVER)]
     return {name: Classical(name) for name in chosen}
 
 

@@ -33,8 +33,10 @@ POLICIES: Final[dict[str, type[Any]]] = {
     "random": Random,
 }
 """Classes made with (scenario, gains), the gains being of the class's `Settings`."""
+SOLVER: Final = "clarabel"
+"""The library that solves cone programs, of the extra `optimal`."""
 PLANNING: Final = ("mpc", "lqr_planned")
-"""Those that need a solver of cone programs, of the extra `optimal`."""
+"""Those that need it."""
 SLOW: Final = ("mpc",)
 """Those that solve a program at each step: a hundred times as long as the others."""
 FLOORS: Final = ("zero", "random")

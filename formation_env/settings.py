@@ -5,6 +5,7 @@ keys and wrong types are refused, and numbers are never read out of strings.
 """
 
 import difflib
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from dataclasses import fields as dataclass_fields
@@ -152,6 +153,20 @@ def load_yaml(path: Path) -> Any:
         raise ConfigError(f"{path}: {line}no valid YAML: {error.problem}") from None
     except (YAMLError, ValueError) as error:  # ValueError: not UTF-8, or a date that does not exist
         raise ConfigError(f"{path}: no valid YAML: {' '.join(str(error).split())}") from None
+
+
+def load_json(path: Path) -> Any:
+    """Read one JSON file.
+
+    Raises:
+        ConfigError: the file is missing, unreadable, or no JSON.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise ConfigError(f"{path}: no valid JSON: {error}") from None
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

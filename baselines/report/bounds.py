@@ -10,11 +10,11 @@ import numpy as np
 
 from baselines.fuel import fuel_optimal
 from baselines.jobs import Progress
+from baselines.registry import SOLVER
 from formation_env.dynamics import NONLINEAR
 from formation_env.dynamics.base import Array
 from formation_env.scenario import Scenario
 
-SOLVER: Final = "clarabel"
 FOLDER: Final = "bounds"
 """Where the plans are kept, inside the report's folder."""
 _CHUNK: Final = 10

@@ -12,7 +12,8 @@ import pandas as pd
 from baselines import jobs
 from baselines.factories import PolicyFactory
 from baselines.kept import FOLDER, keep
-from baselines.report.bounds import SOLVER, Bounds, bound_jobs
+from baselines.registry import SOLVER
+from baselines.report.bounds import Bounds, bound_jobs
 from baselines.report.flights import Flown, flight_jobs, join_episodes, join_flights
 from baselines.report.wanted import Wanted
 from baselines.report.work import episode_jobs

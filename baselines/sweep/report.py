@@ -10,6 +10,7 @@ from typing import Any, Final
 from baselines import jobs
 from baselines.factories import PolicyFactory
 from baselines.kept import FOLDER, keep
+from baselines.registry import SOLVER
 from baselines.report.document import to_json, versions
 from baselines.report.flights import Environment, name_environments
 from baselines.sweep.flights import Sweep, points
@@ -66,7 +67,7 @@ def write_sweep(
     scenarios, seeds = name_environments(envs), seeds_of("test", wanted.episodes)
     work = points(scenarios, policies, seeds, wanted.bound_episodes)
     if any(job.bound_seeds for job in work.values()):
-        import_module("clarabel")  # that it is missing should be known before the flights, not after
+        import_module(SOLVER)  # that it is missing should be known before the flights, not after
     found = jobs.fly(keep(work, out / FOLDER if wanted.resume else None), workers)
     sweep = Sweep.join([found[name] for name in work], {})
     data = document(scenarios, sweep, seeds, wanted, command)
