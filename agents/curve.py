@@ -8,7 +8,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from agents.runs import CURVE, Run, load_run
+from agents.runs import Run, load_run, read_curve
 from agents.validation import validate
 from baselines import make_policy
 from formation_env.files import replacing
@@ -17,21 +17,6 @@ from formation_env.settings import ConfigError
 COLORS: Final = {"zero": "#868b94", "lqr": "#0072B2", "lqr_tracking": "#56B4E9", "smc": "#D55E00"}
 LEARNED: Final = "#009E73"
 """Okabe and Ito's colours, told apart by colour-blind readers; the same as the report's."""
-
-
-def read_curve(folder: Path) -> pd.DataFrame:
-    """A run's validations, one line each.
-
-    Raises:
-        ConfigError: there are none.
-    """
-    path = folder / CURVE
-    try:
-        return pd.read_csv(path)
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
-    except pd.errors.EmptyDataError:
-        raise ConfigError(f"{path}: has no validation yet") from None
 
 
 def draw(folder: Path, out: Path, baselines: Sequence[str]) -> None:

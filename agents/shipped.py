@@ -40,13 +40,15 @@ class Trained:
     Attributes:
         seed: of the training.
         steps: environment steps flown.
-        wall_time_s: of the training, s.
+        pretraining_s: wall time of what came before the first of them, s; none where it is not known.
+        wall_time_s: of the training from there on, s.
         validation_cost_m_s: mean cost on the validation seeds, by which the shipped run was chosen, m/s.
         test_cost_m_s: cost on the test seeds, m/s; nothing was chosen by it.
     """
 
     seed: int
     steps: int
+    pretraining_s: Real | None
     wall_time_s: Real
     validation_cost_m_s: Real
     test_cost_m_s: Interval

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import configure
@@ -18,7 +19,7 @@ from agents.actor import Functions, to_bytes
 from agents.checkpoint import State, load_checkpoint, restore
 from agents.models import make_env, make_model
 from agents.pretraining.pretrain import pretrain
-from agents.runs import CHECKPOINT, START, TENSORBOARD, Run, load_run, start_run
+from agents.runs import CHECKPOINT, PRETRAINING, START, TENSORBOARD, Run, load_run, start_run
 from agents.settings import SQUASH_OF
 from agents.start import start_from
 from agents.validation import Outcome, Validation
@@ -94,11 +95,31 @@ def _pretrained(run: Run, folder: Path) -> Path:
         functions = Functions(
             agent.network.activation, SQUASH_OF[run.algorithm], agent.throttle_power, agent.magnification
         )
+        told = Judgements(run.validation_episodes)
         actor = pretrain(
-            agent.pretraining, agent.network, functions, run.scenario, run.seed, run.validation_episodes, tqdm.write
+            agent.pretraining, agent.network, functions, run.scenario, run.seed, run.validation_episodes, told.note
         )
-        write_files(folder, {START: to_bytes(actor)})
+        write_files(folder, {START: to_bytes(actor), PRETRAINING: told.csv().encode()})  # the first appears last
     return path
+
+
+class Judgements:
+    """What pretraining came to, from time to time; the clock starts with the object."""
+
+    def __init__(self, episodes: int) -> None:
+        self._episodes = episodes
+        self._start_s = time.perf_counter()
+        self._lines: list[tuple[str, float, float]] = []
+
+    def note(self, done: str, cost: float) -> None:
+        """Remember and show what has been done, and the mean validation cost that it came to, m/s."""
+        self._lines.append((done, round(time.perf_counter() - self._start_s, 1), -cost))
+        tqdm.write(f"{done}: {cost:.4f} m/s on {self._episodes} validation seeds")
+
+    def csv(self) -> str:
+        """The file `PRETRAINING`; its last line is the end, where all that is done is judged."""
+        table = pd.DataFrame(self._lines, columns=["done", "seconds", "return"])
+        return table.to_csv(index=False, float_format="%.6g")
 
 
 def _new_model(run: Run, start: Path | None) -> BaseAlgorithm:
