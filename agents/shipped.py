@@ -123,7 +123,12 @@ def shipped_paths() -> list[Path]:
 
 def policy_name(algorithm: str, env: str) -> str:
     """What a policy's files are called."""
-    return f"{algorithm}_{Path(ENV_IDS.get(env, env)).stem}"
+    return f"{algorithm}_{scenario_name(env)}"
+
+
+def scenario_name(env: str) -> str:
+    """The scenario's name, of a registered id, a name or a file."""
+    return Path(ENV_IDS.get(env, env)).stem
 
 
 def load_with_card(path: Path) -> tuple[Actor, Card]:
