@@ -4,7 +4,9 @@ import hashlib
 import re
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
+
+from pydantic import Field
 
 from agents.actor import Actor, read_actor
 from formation_env.envs import ENV_IDS
@@ -80,7 +82,7 @@ class Card:
     test_episodes: int
     first_test_costs_m_s: tuple[Real, ...]
     cost_over_runs_m_s: Interval | None
-    runs: tuple[Trained, ...]
+    runs: Annotated[tuple[Trained, ...], Field(min_length=1)]
     training: dict[str, Any]
     scenario: Scenario
 
