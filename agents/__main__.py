@@ -118,6 +118,39 @@ def _tell_end(outcome: str, folder: Path) -> None:
 
 
 @app.command()
+def tune(
+    algorithm: Annotated[str, typer.Argument(help="ppo or sac.")],
+    env: Annotated[str, typer.Argument(help="A registered id, or a scenario's name or YAML file.")],
+    trials: Annotated[int, typer.Option(min=1, help="Trainings, the first with the hyperparameters of the file.")] = 20,
+    steps: Annotated[int | None, typer.Option(min=1, help="Environment steps of each; else as in the file.")] = None,
+    config: Annotated[Path | None, typer.Option(help="Hyperparameters; else configs/agents/ALGORITHM.yaml.")] = None,
+    study: Annotated[
+        Path | None, typer.Option(file_okay=False, help="Folder to go on with; else runs/tuning/ALGORITHM_ENV.")
+    ] = None,
+    start: Annotated[Path | None, typer.Option(help="Actor that all start from; else it is pretrained once.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="As of train.")] = 0,
+    rows: Annotated[int | None, typer.Option(min=1, help="Environments side by side; else as in the file.")] = None,
+    validations: Annotated[int, typer.Option(min=1, help="Of each trial; there it may be given up.")] = 8,
+    validation_episodes: Annotated[int, typer.Option(min=2, help="Episodes of each validation.")] = 64,
+) -> None:
+    """Search hyperparameters by the validation cost; the best are STUDY/best.yaml, for --config of train."""
+    with _plain_errors():
+        from agents.plan import default_folder, plan_run
+        from agents.tuning.search import BEST, search
+
+        run = plan_run(
+            algorithm, env, steps, seed, rows, config, validations, validation_episodes, 1, start, _command()
+        )
+        folder = study or Path("runs/tuning") / default_folder(run).name.rpartition("_")[0]
+        try:
+            found = search(run, trials, folder, lambda found: typer.echo(found.in_words()))
+        except KeyboardInterrupt:
+            typer.echo(f"interrupted; finished trials are kept in {folder}, the same command goes on", err=True)
+            raise typer.Exit(INTERRUPTED) from None
+        typer.echo(f"{found.in_words()}; the hyperparameters are {folder / BEST}")
+
+
+@app.command()
 def bench(
     env: Annotated[str, typer.Argument(help="A registered id, or a scenario.")] = "FormationKeeping-v0",
     threads: Annotated[list[int], typer.Option(min=1, help="Threads of torch.")] = [1, 2],  # noqa: B006

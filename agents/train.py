@@ -5,7 +5,7 @@ import math
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -40,13 +40,22 @@ def training_seeds(seed: int, rows: int) -> range:
         raise ConfigError(f"seed: no training seeds are left for {rows} rows, got {seed}") from None
 
 
-def train(run: Run, folder: Path, time_limit_s: float = math.inf) -> Outcome:
+Lines = Sequence[Mapping[str, float]]
+"""Of a learning curve, see `Validation`."""
+
+
+def _never(lines: Lines) -> bool:
+    return False
+
+
+def train(run: Run, folder: Path, time_limit_s: float = math.inf, give_up: Callable[[Lines], bool] = _never) -> Outcome:
     """Train as the run says, and keep all in its folder. An interrupt (Ctrl-C) saves and ends.
 
     Args:
         run: what to train.
         folder: of the run; must not hold one yet.
         time_limit_s: the training stops before the first rollout after this time; s.
+        give_up: asked before each rollout whether to stop for good, told the learning curve up to there.
 
     Returns:
         Why it ended.
@@ -61,8 +70,8 @@ def train(run: Run, folder: Path, time_limit_s: float = math.inf) -> Outcome:
         start_run(run, folder)
     else:
         start_run(run, folder)
-        model = _new_model(run, _pretrained(run, folder))
-    return _learn(model, run, folder, None, time_limit_s)
+        model = _new_model(run, pretrained(run, folder))
+    return _learn(model, run, folder, None, time_limit_s, give_up)
 
 
 def resume(folder: Path, time_limit_s: float = math.inf) -> Outcome:
@@ -80,14 +89,14 @@ def resume(folder: Path, time_limit_s: float = math.inf) -> Outcome:
         OSError: the folder cannot be written.
     """
     run = load_run(folder)
-    model = _new_model(run, _pretrained(run, folder) if run.agent.pretraining or run.start else None)
+    model = _new_model(run, pretrained(run, folder) if run.agent.pretraining or run.start else None)
     state = load_checkpoint(folder / CHECKPOINT) if (folder / CHECKPOINT).exists() else None
     if state is not None:
         restore(model, state)
     return _learn(model, run, folder, state, time_limit_s)
 
 
-def _pretrained(run: Run, folder: Path) -> Path:
+def pretrained(run: Run, folder: Path) -> Path:
     """The actor in a run's folder that it starts from; made, if it is not there yet."""
     path, agent = folder / START, run.agent
     if agent.pretraining is not None and not path.exists():
@@ -134,7 +143,14 @@ def _new_model(run: Run, start: Path | None) -> BaseAlgorithm:
     return model
 
 
-def _learn(model: BaseAlgorithm, run: Run, folder: Path, state: State | None, time_limit_s: float) -> Outcome:
+def _learn(
+    model: BaseAlgorithm,
+    run: Run,
+    folder: Path,
+    state: State | None,
+    time_limit_s: float,
+    give_up: Callable[[Lines], bool] = _never,
+) -> Outcome:
     """Train up to the run's last step, or until it has to end."""
     model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
     ends_s = time.perf_counter() + time_limit_s
@@ -143,6 +159,8 @@ def _learn(model: BaseAlgorithm, run: Run, folder: Path, state: State | None, ti
         def must_end() -> Outcome | None:
             if stop.is_set():
                 return "interrupted"
+            if give_up(validation.lines):
+                return "given up"
             return "out of time" if time.perf_counter() > ends_s else None
 
         validation = Validation(run, folder, bar, must_end, state)
