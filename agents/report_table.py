@@ -95,7 +95,7 @@ def _over(results: Results, label: str, others: Iterable[str]) -> str:
     best = next((name for name in results.ranking if name in known), None)
     if best is None or not results.cost(best)[0] > 0:
         return NONE
-    seeds = f", {results.count(best)} seeds" if best in results.partial else ""
+    seeds = f", {results.count(best)} of {results.count(label)} seeds" if best in results.partial else ""
     return f"{_text(results.over(label, best))} ({best}{seeds})"
 
 
