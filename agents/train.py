@@ -19,7 +19,6 @@ from agents.checkpoint import State, load_checkpoint, restore
 from agents.models import make_env, make_model
 from agents.pretraining.pretrain import pretrain
 from agents.runs import CHECKPOINT, START, TENSORBOARD, Run, load_run, start_run
-from agents.settings import SQUASH_OF
 from agents.start import start_from
 from agents.validation import Outcome, Validation
 from formation_env.files import write_files
@@ -91,9 +90,7 @@ def _pretrained(run: Run, folder: Path) -> Path:
     path, agent = folder / START, run.agent
     if agent.pretraining is not None and not path.exists():
         torch.set_num_threads(run.threads)
-        functions = Functions(
-            agent.network.activation, SQUASH_OF[run.algorithm], agent.throttle_power, agent.magnification
-        )
+        functions = Functions(agent.network.activation, "tanh", agent.throttle_power, agent.magnification)
         actor = pretrain(
             agent.pretraining, agent.network, functions, run.scenario, run.seed, run.validation_episodes, tqdm.write
         )
