@@ -32,6 +32,9 @@ MISTAKE = 2
 """Exit code after a mistake of the user."""
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it."""
+Bounds = Annotated[Path, typer.Option(file_okay=False, help="Folder that keeps the bounds.")]
+BOUNDS = Path("reports/bounds")
+"""Where the report keeps them, too."""
 
 
 @contextlib.contextmanager
@@ -46,7 +49,7 @@ def _plain_errors() -> Iterator[None]:
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(MISTAKE) from None
     except ModuleNotFoundError as error:
-        typer.echo(f"error: {error}; pip install 'formation-env[rl,report]'", err=True)
+        typer.echo(f"error: {error}; pip install 'formation-env[rl,report,optimal]'", err=True)
         raise typer.Exit(MISTAKE) from None
 
 
@@ -115,6 +118,39 @@ def _tell_end(outcome: str, folder: Path) -> None:
 
 
 @app.command()
+def tune(
+    algorithm: Annotated[str, typer.Argument(help="ppo or sac.")],
+    env: Annotated[str, typer.Argument(help="A registered id, or a scenario's name or YAML file.")],
+    trials: Annotated[int, typer.Option(min=1, help="Trainings, the first with the hyperparameters of the file.")] = 20,
+    steps: Annotated[int | None, typer.Option(min=1, help="Environment steps of each; else as in the file.")] = None,
+    config: Annotated[Path | None, typer.Option(help="Hyperparameters; else configs/agents/ALGORITHM.yaml.")] = None,
+    study: Annotated[
+        Path | None, typer.Option(file_okay=False, help="Folder to go on with; else runs/tuning/ALGORITHM_ENV.")
+    ] = None,
+    start: Annotated[Path | None, typer.Option(help="Actor that all start from; else it is pretrained once.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="As of train.")] = 0,
+    rows: Annotated[int | None, typer.Option(min=1, help="Environments side by side; else as in the file.")] = None,
+    validations: Annotated[int, typer.Option(min=1, help="Of each trial; there it may be given up.")] = 8,
+    validation_episodes: Annotated[int, typer.Option(min=2, help="Episodes of each validation.")] = 64,
+) -> None:
+    """Search hyperparameters by the validation cost; the best are STUDY/best.yaml, for --config of train."""
+    with _plain_errors():
+        from agents.plan import default_folder, plan_run
+        from agents.tuning.search import BEST, search
+
+        run = plan_run(
+            algorithm, env, steps, seed, rows, config, validations, validation_episodes, 1, start, _command()
+        )
+        folder = study or Path("runs/tuning") / default_folder(run).name.rpartition("_")[0]
+        try:
+            found = search(run, trials, folder, lambda found: typer.echo(found.in_words()))
+        except KeyboardInterrupt:
+            typer.echo(f"interrupted; finished trials are kept in {folder}, the same command goes on", err=True)
+            raise typer.Exit(INTERRUPTED) from None
+        typer.echo(f"{found.in_words()}; the hyperparameters are {folder / BEST}")
+
+
+@app.command()
 def bench(
     env: Annotated[str, typer.Argument(help="A registered id, or a scenario.")] = "FormationKeeping-v0",
     threads: Annotated[list[int], typer.Option(min=1, help="Threads of torch.")] = [1, 2],  # noqa: B006
@@ -129,16 +165,17 @@ def bench(
 
 @app.command()
 def curve(
-    folder: Annotated[Path, typer.Argument(help="Folder of a run.")],
-    out: Annotated[Path, typer.Option(help="The picture, PNG, SVG or PDF.")],
-    baseline: Annotated[list[str], typer.Option(help="Classical policies drawn as levels.")] = ["zero", "lqr"],  # noqa: B006
+    runs: Annotated[list[Path], typer.Argument(help="Folders of runs, of any algorithms, environments and seeds.")],
+    out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the pictures, learning_ENVIRONMENT.png.")],
+    baseline: Annotated[list[str], typer.Option(help="Classical policies drawn as levels.")] = ["lqr", "lqr_planned"],  # noqa: B006
+    bounds: Bounds = BOUNDS,
 ) -> None:
-    """Draw a run's learning curve, with classical policies flown on the same validation seeds as levels."""
+    """Draw learning curves, a picture per environment; classical policies fly the same validation seeds as levels."""
     with _plain_errors():
         from agents.curve import draw
 
-        draw(folder, out, baseline)
-        typer.echo(out)
+        for picture in draw(runs, out, baseline, bounds):
+            typer.echo(picture)
 
 
 @app.command()
@@ -159,7 +196,7 @@ def evaluate(
     env: Annotated[str | None, typer.Option(help="Where to fly; else where it was trained.")] = None,
     episodes: Annotated[int, typer.Option(min=1, help="Test seeds.")] = 100,
     bound_episodes: Annotated[int, typer.Option(min=0, help="Of these, seeds held against the bound; 0 is none.")] = 20,
-    bounds: Annotated[Path, typer.Option(help="Folder that keeps the bounds.")] = Path("reports/bounds"),
+    bounds: Bounds = BOUNDS,
     allow_pickle: Annotated[bool, typer.Option("--allow-pickle", help="Load a .zip, which may run any code.")] = False,
     throttle_power: Annotated[
         float | None, typer.Option(min=0.01, help="p, if a .zip's actions z mean sign(z)|z|^p; else they are thrusts.")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 from zipfile import BadZipFile, ZipFile
 
+import numpy as np
 import pandas as pd
 
 from agents.actor import ACTIONS, Actor
@@ -16,6 +17,7 @@ from agents.throttle import throttle
 from baselines import fuel_optimal, regret
 from baselines.registry import SOLVER
 from formation_env.dynamics import NONLINEAR
+from formation_env.dynamics.base import Array
 from formation_env.evaluation import Policy, evaluate, scenario_of, summarise
 from formation_env.observation import SIZE
 from formation_env.scenario import Scenario
@@ -120,18 +122,27 @@ def score(policy: Policy, scenario: Scenario, episodes: int, bound_episodes: int
     table = evaluate(policy, scenario, seeds("test", episodes))
     summary = summarise(table).assign(seeds=episodes)
     judged = seeds("test", episodes)[:bound_episodes]
-    if judged and find_spec(SOLVER) and scenario.dynamics != NONLINEAR:
-        found = regret(-table["return"].to_numpy(float)[: len(judged)], _bounds(scenario, judged, cache))
+    least = least_costs(scenario, judged, cache)
+    if judged and least is not None:
+        found = regret(-table["return"].to_numpy(float)[: len(judged)], least)
         summary.loc["cost_over_bound"] = [found.mean, found.low, found.high, len(judged)]
     return summary.astype({"seeds": int})
 
 
-def _bounds(scenario: Scenario, judged: Sequence[int], cache: Path) -> list[float]:
-    """The least cost of each seed, m/s."""
+def least_costs(scenario: Scenario, judged: Sequence[int], cache: Path) -> Array | None:
+    """The bound of each seed (seeds,), m/s; None where it is not known: no solver, or a nonlinear truth.
+
+    Args:
+        scenario: what is flown.
+        judged: the seeds.
+        cache: folder in which the bounds are kept.
+    """
     from tqdm import tqdm
 
+    if find_spec(SOLVER) is None or scenario.dynamics == NONLINEAR:
+        return None
     shown = tqdm(judged, desc="bounds", unit="episode", leave=False, dynamic_ncols=True)
-    return [fuel_optimal(scenario, seed=seed, cache_folder=cache).cost for seed in shown]
+    return np.array([fuel_optimal(scenario, seed=seed, cache_folder=cache).cost for seed in shown])
 
 
 def choose(source: Path, env: str | None, allow_pickle: bool, throttle_power: float | None) -> tuple[Policy, Scenario]:

@@ -13,7 +13,7 @@ from scipy import stats
 
 from agents.actor import Actor, to_bytes
 from agents.graph import to_onnx
-from agents.runs import Run, load_best
+from agents.runs import Run, load_best, read_curve, read_pretraining
 from agents.shipped import CARD, GRAPH, TENSORS, Card, Interval, Trained, policy_name, sha256
 from formation_env.evaluation import evaluate, summarise
 from formation_env.files import write_files
@@ -89,19 +89,26 @@ def _open(folders: Sequence[Path]) -> list[tuple[Path, Run, Actor]]:
 
 def _examine(folder: Path, run: Run, actor: Actor) -> Candidate:
     """Fly a policy on the validation and on the test seeds."""
-    from agents.curve import read_curve
-
     last = read_curve(folder).iloc[-1]
     validation = evaluate(actor, run.scenario, seeds("validation", VALIDATION_EPISODES))
     episodes = evaluate(actor, run.scenario, seeds("test", TEST_EPISODES))
     trained = Trained(
         seed=run.seed,
         steps=int(last["steps"]),
+        pretraining_s=_pretraining_s(folder, run),
         wall_time_s=float(last["seconds"]),
         validation_cost_m_s=-float(validation["return"].mean()),
         test_cost_m_s=_cost(episodes),
     )
     return Candidate(run, actor, trained, episodes)
+
+
+def _pretraining_s(folder: Path, run: Run) -> float | None:
+    """Time until there was an actor to start from, s; None if nobody knows, as where one was given."""
+    judged = read_pretraining(folder)
+    if judged is not None:
+        return float(judged["seconds"].max())
+    return None if run.agent.pretraining or run.start else 0.0
 
 
 def _cost(episodes: pd.DataFrame) -> Interval:

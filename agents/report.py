@@ -8,10 +8,12 @@ from typing import Any
 
 from agents.actor import Actor, to_bytes
 from agents.evaluate import open_policy
-from agents.shipped import CARD, read_card, sha256, shipped_paths
+from agents.report_table import learned_table
+from agents.shipped import CARD, TENSORS, Card, read_card, sha256, shipped_paths
 from baselines.factories import classical
 from baselines.registry import POLICIES
-from baselines.report import Wanted, write_report
+from baselines.report import Table, Wanted, write_report
+from baselines.report.results import Results
 from formation_env.envs import ENV_IDS
 from formation_env.evaluation import scenario_of
 from formation_env.scenario import Scenario, scenario_names
@@ -71,7 +73,8 @@ def report_models(
     Args:
         models: each LABEL=PATH; policies of several scenarios may share a label. Without any, those that are shipped,
             by their algorithms.
-        envs: registered ids, or names or paths of scenarios; by default those of the models, or the registered ones.
+        envs: registered ids, or names or paths of scenarios; by default those of the models, or the registered ones
+            and those of the shipped policies.
         wanted: how much to fly.
         out: folder of the report.
         command: the command line, to be noted.
@@ -86,10 +89,20 @@ def report_models(
     """
     sources = parse_models(models) if models else shipped_by_algorithm()
     learned = {label: Learned(label, tuple(paths)) for label, paths in sources.items()}
-    flown = list(envs or (envs_of(learned) if models else ENV_IDS))
+    flown = list(envs or dict.fromkeys((*(() if models else ENV_IDS), *envs_of(learned))))
     if models:
         _check_flown(learned, flown)
-    return write_report({**classical(), **learned}, flown, wanted, out, command, workers)
+    cards = {label: _cards(paths) for label, paths in sources.items()}
+
+    def tables(results: Sequence[Results]) -> list[Table]:
+        return [learned_table(results, cards)] if any(cards.values()) else []
+
+    return write_report({**classical(), **learned}, flown, wanted, out, command, workers, tables)
+
+
+def _cards(paths: Sequence[Path]) -> list[Card]:
+    """Of those policies that have one; runs' folders have none."""
+    return [read_card(path.with_suffix(CARD)) for path in paths if path.suffix == TENSORS]
 
 
 def parse_models(models: Sequence[str]) -> dict[str, list[Path]]:

@@ -8,6 +8,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any, Final
 
+import pandas as pd
 from pydantic import Field, Strict
 
 from agents.actor import Actor, read_actor
@@ -25,6 +26,8 @@ START: Final = "start.safetensors"
 CHECKPOINT: Final = "checkpoint.pt"
 RUN: Final = "settings.json"
 CURVE: Final = "validation.csv"
+PRETRAINING: Final = "pretraining.csv"
+"""What came before, if anything did: done, seconds and return of each judgement; the last one is its end."""
 TENSORBOARD: Final = "tensorboard"
 
 LIBRARIES: Final = ("formation-env", "gymnasium", "numpy", "stable-baselines3", "torch")
@@ -124,3 +127,31 @@ def load_best(folder: Path) -> tuple[Run, Actor]:
     """
     run = load_run(folder)
     return run, read_actor(folder / BEST, run.scenario)
+
+
+def read_curve(folder: Path) -> pd.DataFrame:
+    """A run's validations, one line each.
+
+    Raises:
+        ConfigError: there are none.
+    """
+    return _read_lines(folder / CURVE)
+
+
+def read_pretraining(folder: Path) -> pd.DataFrame | None:
+    """The judgements during a run's pretraining, one line each; None if the run has no such file.
+
+    Raises:
+        ConfigError: the file cannot be read.
+    """
+    path = folder / PRETRAINING
+    return _read_lines(path) if path.exists() else None
+
+
+def _read_lines(path: Path) -> pd.DataFrame:
+    try:
+        return pd.read_csv(path)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
+    except pd.errors.EmptyDataError:
+        raise ConfigError(f"{path}: has no validation yet") from None

@@ -4,7 +4,9 @@ import hashlib
 import re
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
+
+from pydantic import Field
 
 from agents.actor import Actor, read_actor
 from formation_env.envs import ENV_IDS
@@ -40,13 +42,15 @@ class Trained:
     Attributes:
         seed: of the training.
         steps: environment steps flown.
-        wall_time_s: of the training, s.
+        pretraining_s: wall time of what came before the first of them, s; none where it is not known.
+        wall_time_s: of the training from there on, s.
         validation_cost_m_s: mean cost on the validation seeds, by which the shipped run was chosen, m/s.
         test_cost_m_s: cost on the test seeds, m/s; nothing was chosen by it.
     """
 
     seed: int
     steps: int
+    pretraining_s: Real | None
     wall_time_s: Real
     validation_cost_m_s: Real
     test_cost_m_s: Interval
@@ -78,7 +82,7 @@ class Card:
     test_episodes: int
     first_test_costs_m_s: tuple[Real, ...]
     cost_over_runs_m_s: Interval | None
-    runs: tuple[Trained, ...]
+    runs: Annotated[tuple[Trained, ...], Field(min_length=1)]
     training: dict[str, Any]
     scenario: Scenario
 
@@ -121,7 +125,12 @@ def shipped_paths() -> list[Path]:
 
 def policy_name(algorithm: str, env: str) -> str:
     """What a policy's files are called."""
-    return f"{algorithm}_{Path(ENV_IDS.get(env, env)).stem}"
+    return f"{algorithm}_{scenario_name(env)}"
+
+
+def scenario_name(env: str) -> str:
+    """The scenario's name, of a registered id, a name or a file."""
+    return Path(ENV_IDS.get(env, env)).stem
 
 
 def load_with_card(path: Path) -> tuple[Actor, Card]:

@@ -5,10 +5,11 @@ import math
 import signal
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.logger import configure
@@ -18,7 +19,7 @@ from agents.actor import Functions, to_bytes
 from agents.checkpoint import State, load_checkpoint, restore
 from agents.models import make_env, make_model
 from agents.pretraining.pretrain import pretrain
-from agents.runs import CHECKPOINT, START, TENSORBOARD, Run, load_run, start_run
+from agents.runs import CHECKPOINT, PRETRAINING, START, TENSORBOARD, Run, load_run, start_run
 from agents.start import start_from
 from agents.validation import Outcome, Validation
 from formation_env.files import write_files
@@ -38,13 +39,22 @@ def training_seeds(seed: int, rows: int) -> range:
         raise ConfigError(f"seed: no training seeds are left for {rows} rows, got {seed}") from None
 
 
-def train(run: Run, folder: Path, time_limit_s: float = math.inf) -> Outcome:
+Lines = Sequence[Mapping[str, float]]
+"""Of a learning curve, see `Validation`."""
+
+
+def _never(lines: Lines) -> bool:
+    return False
+
+
+def train(run: Run, folder: Path, time_limit_s: float = math.inf, give_up: Callable[[Lines], bool] = _never) -> Outcome:
     """Train as the run says, and keep all in its folder. An interrupt (Ctrl-C) saves and ends.
 
     Args:
         run: what to train.
         folder: of the run; must not hold one yet.
         time_limit_s: the training stops before the first rollout after this time; s.
+        give_up: asked before each rollout whether to stop for good, told the learning curve up to there.
 
     Returns:
         Why it ended.
@@ -59,8 +69,8 @@ def train(run: Run, folder: Path, time_limit_s: float = math.inf) -> Outcome:
         start_run(run, folder)
     else:
         start_run(run, folder)
-        model = _new_model(run, _pretrained(run, folder))
-    return _learn(model, run, folder, None, time_limit_s)
+        model = _new_model(run, pretrained(run, folder))
+    return _learn(model, run, folder, None, time_limit_s, give_up)
 
 
 def resume(folder: Path, time_limit_s: float = math.inf) -> Outcome:
@@ -78,24 +88,44 @@ def resume(folder: Path, time_limit_s: float = math.inf) -> Outcome:
         OSError: the folder cannot be written.
     """
     run = load_run(folder)
-    model = _new_model(run, _pretrained(run, folder) if run.agent.pretraining or run.start else None)
+    model = _new_model(run, pretrained(run, folder) if run.agent.pretraining or run.start else None)
     state = load_checkpoint(folder / CHECKPOINT) if (folder / CHECKPOINT).exists() else None
     if state is not None:
         restore(model, state)
     return _learn(model, run, folder, state, time_limit_s)
 
 
-def _pretrained(run: Run, folder: Path) -> Path:
+def pretrained(run: Run, folder: Path) -> Path:
     """The actor in a run's folder that it starts from; made, if it is not there yet."""
     path, agent = folder / START, run.agent
     if agent.pretraining is not None and not path.exists():
         torch.set_num_threads(run.threads)
         functions = Functions(agent.network.activation, "tanh", agent.throttle_power, agent.magnification)
+        told = Judgements(run.validation_episodes)
         actor = pretrain(
-            agent.pretraining, agent.network, functions, run.scenario, run.seed, run.validation_episodes, tqdm.write
+            agent.pretraining, agent.network, functions, run.scenario, run.seed, run.validation_episodes, told.note
         )
-        write_files(folder, {START: to_bytes(actor)})
+        write_files(folder, {START: to_bytes(actor), PRETRAINING: told.csv().encode()})  # the first appears last
     return path
+
+
+class Judgements:
+    """What pretraining came to, from time to time; the clock starts with the object."""
+
+    def __init__(self, episodes: int) -> None:
+        self._episodes = episodes
+        self._start_s = time.perf_counter()
+        self._lines: list[tuple[str, float, float]] = []
+
+    def note(self, done: str, cost: float) -> None:
+        """Remember and show what has been done, and the mean validation cost that it came to, m/s."""
+        self._lines.append((done, round(time.perf_counter() - self._start_s, 1), -cost))
+        tqdm.write(f"{done}: {cost:.4f} m/s on {self._episodes} validation seeds")
+
+    def csv(self) -> str:
+        """The file `PRETRAINING`; its last line is the end, where all that is done is judged."""
+        table = pd.DataFrame(self._lines, columns=["done", "seconds", "return"])
+        return table.to_csv(index=False, float_format="%.6g")
 
 
 def _new_model(run: Run, start: Path | None) -> BaseAlgorithm:
@@ -110,7 +140,14 @@ def _new_model(run: Run, start: Path | None) -> BaseAlgorithm:
     return model
 
 
-def _learn(model: BaseAlgorithm, run: Run, folder: Path, state: State | None, time_limit_s: float) -> Outcome:
+def _learn(
+    model: BaseAlgorithm,
+    run: Run,
+    folder: Path,
+    state: State | None,
+    time_limit_s: float,
+    give_up: Callable[[Lines], bool] = _never,
+) -> Outcome:
     """Train up to the run's last step, or until it has to end."""
     model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
     ends_s = time.perf_counter() + time_limit_s
@@ -119,6 +156,8 @@ def _learn(model: BaseAlgorithm, run: Run, folder: Path, state: State | None, ti
         def must_end() -> Outcome | None:
             if stop.is_set():
                 return "interrupted"
+            if give_up(validation.lines):
+                return "given up"
             return "out of time" if time.perf_counter() > ends_s else None
 
         validation = Validation(run, folder, bar, must_end, state)

@@ -19,7 +19,7 @@ from formation_env.files import replacing, write_files
 from formation_env.scenario import Scenario
 from formation_env.seeds import seeds
 
-Outcome = Literal["finished", "interrupted", "out of time"]
+Outcome = Literal["finished", "interrupted", "out of time", "given up"]
 
 MEANS: Final = ("delta_v_m_s", "position_error_mean_m")
 """Metrics noted besides the return."""

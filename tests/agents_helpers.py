@@ -24,6 +24,8 @@ SMALL = {
     "sac": "rows: 8\ngradient_steps: 1\nbatch_size: 16\nbuffer_size: 500\nlearning_starts: 64\n"
     "network: {hidden: [8]}\n",
 }
+PRETRAINED = "pretraining: {teacher: lqr, rounds: 1, rows: 4, updates: 2, episodes: 4, batch: 2}\n"
+"""Line for the hyperparameters of a run that imitates and follows the gradient, each a little."""
 
 
 def small_run(folder: Path, algorithm: str, agent: str = "", **changes: Any) -> Run:

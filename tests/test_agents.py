@@ -178,20 +178,6 @@ def test_a_folder_without_run_or_model_is_one_line(tmp_path: Path) -> None:
         load_best(tmp_path)
 
 
-def test_the_curve_is_drawn_and_names_what_is_missing(finished: tuple[Run, Path], tmp_path: Path) -> None:
-    """A picture in the format of its ending; an unknown ending, or no run, is one line."""
-    _, folder = finished
-    picture = tmp_path / "new" / "curve.png"
-    result = CliRunner().invoke(app, ["curve", str(folder), "--out", str(picture), "--baseline", "zero"])
-    assert result.exit_code == 0, result.output
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    assert [path.name for path in picture.parent.iterdir()] == ["curve.png"]
-    for arguments in ([str(folder), "--out", "curve.txt"], [str(tmp_path), "--out", str(picture)]):
-        result = CliRunner().invoke(app, ["curve", *arguments])
-        assert result.exit_code == MISTAKE
-        assert result.stderr.count("\n") == 1
-
-
 def test_validation_is_of_the_mean_and_its_interval(tmp_path: Path) -> None:
     """A policy that coasts spends nothing and costs what its error costs: 0.01 m/s per m of mean error."""
 

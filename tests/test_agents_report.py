@@ -14,7 +14,7 @@ from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from typer.testing import CliRunner, Result
 
-from agents import Actor, shipped
+from agents import Actor, report, shipped
 from agents.__main__ import MISTAKE, app
 from agents.actor import Functions, to_bytes
 from agents.evaluate import Sb3Policy, algorithm_of
@@ -33,6 +33,12 @@ KEEPING, START = "FormationKeeping-v0", "FormationInitialization-v0"
 EPISODES = 2
 
 
+def trained(seed: int, cost: dict[str, float]) -> dict[str, object]:
+    """A run of two minutes with one before it."""
+    times = {"pretraining_s": 60.0, "wall_time_s": 120.0}
+    return {"seed": seed, "steps": 1000, "validation_cost_m_s": 0.0, "test_cost_m_s": cost} | times
+
+
 def write_policy(folder: Path, algorithm: str, env: str) -> Path:
     """A shipped policy that has never learnt: it pushes a little, in a direction that depends on the algorithm."""
     scenario = load_scenario(ENV_IDS.get(env, env))
@@ -48,7 +54,7 @@ def write_policy(folder: Path, algorithm: str, env: str) -> Path:
         "test_episodes": 2,
         "first_test_costs_m_s": [],
         "cost_over_runs_m_s": None,
-        "runs": [],
+        "runs": [trained(seed, interval) for seed in (0, 1)],
         "training": {},
         "scenario": json.loads(json.dumps(vars(scenario), default=vars)),
     }
@@ -102,6 +108,9 @@ def test_shipped_policies_stand_in_the_report_by_themselves(policies: Path, tmp_
     again = evaluate(shipped.load_policy("sac", START), START, seeds("test", EPISODES))
     own = table[table["policy"] == "sac"]
     np.testing.assert_allclose(own["return"], again["return"], rtol=1e-6)  # decimal numbers in the file
+    lines = (out / "learned.md").read_text().splitlines()
+    assert [line.split(" | ")[:2] for line in lines[2:4]] == [[f"| {START}", "ppo"], [f"| {START}", "sac"]]
+    assert "Learned policies: cost, training and compute</h2>" in (out / "report.html").read_text()
 
 
 def test_a_policy_flies_on_its_own_scenario_only(policies: Path) -> None:
@@ -164,6 +173,20 @@ def test_environments_follow_from_the_models(policies: Path, tmp_path: Path) -> 
     result = run("report", "--model", f"mine={own}", "--out", tmp_path / "out")
     assert result.exit_code == MISTAKE
     assert "was trained on a scenario of its own; name its file" in result.stderr
+
+
+def test_what_is_shipped_flies_where_it_was_trained(
+    policies: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By default the registered ids, and scenarios that a shipped policy was trained on and that have no id."""
+    write_policy(policies, "ppo", "bad_communication")
+    flown: list[list[str]] = []
+    monkeypatch.setattr(report, "write_report", lambda _, envs, *rest: flown.append(list(envs)) or tmp_path)
+    assert run("report", "--out", tmp_path).exit_code == 0
+    assert run("report", "--env", KEEPING, "--out", tmp_path).exit_code == 0
+    assert flown == [[*ENV_IDS, "bad_communication"], [KEEPING]]
+    bad = load_scenario("bad_communication")
+    assert shipped.load_policy("ppo", "bad_communication").scenario == bad
 
 
 def test_a_model_that_flies_nowhere_is_a_mistake(policies: Path, tmp_path: Path) -> None:

@@ -7,15 +7,16 @@ from typing import Any
 import numpy as np
 import onnxruntime
 import pytest
-from agents_helpers import small_run
+from agents_helpers import PRETRAINED, small_run
 from typer.testing import CliRunner
 
 from agents import Actor, load_policy, shipped
 from agents.__main__ import MISTAKE, app
 from agents.actor import Functions, read_actor
+from agents.export import export
 from agents.graph import to_onnx
-from agents.runs import load_best
-from agents.shipped import CARD, GRAPH, TENSORS, load_with_card, shipped_paths
+from agents.runs import START, load_best, read_pretraining
+from agents.shipped import CARD, GRAPH, TENSORS, load_with_card, read_card, shipped_paths
 from agents.train import train
 from formation_env import ConfigError, FormationVectorEnv, load_scenario
 from formation_env.evaluation import evaluate
@@ -123,6 +124,20 @@ def test_the_run_best_on_validation_is_shipped(runs: list[Path], exported: Path)
     assert over is not None
     assert over.mean == pytest.approx((one + two) / 2)
     assert over.high - over.mean == pytest.approx(12.7062 * abs(one - two) / 2, rel=1e-5)  # Student's t, one degree
+
+
+def test_the_card_has_the_time_of_pretraining(tmp_path: Path) -> None:
+    """None went by without pretraining, its last judgement says it else, and of a given actor nobody knows it."""
+    small = {"steps": 128, "validations": 1}
+    train(small_run(tmp_path, "ppo", PRETRAINED, seed=1, **small), tmp_path / "pretrained")
+    train(small_run(tmp_path, "ppo", start=tmp_path / "pretrained" / START, seed=2, **small), tmp_path / "started")
+    train(small_run(tmp_path, "ppo", seed=3, **small), tmp_path / "new")
+    judged = read_pretraining(tmp_path / "pretrained")
+    assert judged is not None
+    path = export([tmp_path / name for name in ("pretrained", "started", "new")], tmp_path / "out")
+    found = {run.seed: run.pretraining_s for run in read_card(path.with_suffix(CARD)).runs}
+    assert found == {1: pytest.approx(judged["seconds"].iloc[-1]), 2: None, 3: 0.0}
+    assert judged["seconds"].iloc[-1] > 0
 
 
 @pytest.mark.parametrize("activation", ["tanh", "relu", "elu"])

@@ -7,13 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
-from agents_helpers import assert_refused, random_actor, small_run
+from agents_helpers import PRETRAINED, assert_refused, random_actor, small_run
 
 from agents.actor import Actor, Functions, read_actor, to_bytes
 from agents.checkpoint import load_checkpoint
 from agents.convert import actor_of
 from agents.models import make_env, make_model
-from agents.runs import BEST, CHECKPOINT, CURVE, START, Run, load_run, start_run
+from agents.runs import BEST, CHECKPOINT, CURVE, PRETRAINING, START, Run, load_run, read_pretraining, start_run
 from agents.start import start_from
 from agents.train import resume, train
 from agents.validation import validate
@@ -116,18 +116,23 @@ def test_exploration_does_not_fall_below_its_limit(tmp_path: Path) -> None:
     assert (after["log_std"] == -2).all()
 
 
-PRETRAINING = "pretraining: {teacher: lqr, rounds: 1, rows: 4, updates: 2, episodes: 4, batch: 2}\n"
-
-
 @pytest.mark.parametrize("algorithm", ["ppo", "sac"])
 def test_a_run_is_pretrained_once(algorithm: str, tmp_path: Path) -> None:
-    """The curve begins with the pretrained actor; killed before there was one, the run makes the same one again."""
-    run = small_run(tmp_path, algorithm, PRETRAINING)
+    """The curve begins with the best of the judged; killed before there was an actor, the run makes the same again."""
+    run = small_run(tmp_path, algorithm, PRETRAINED)
     train(run, tmp_path / "whole")
     actor = read_actor(tmp_path / "whole" / START, run.scenario)
     assert actor.functions == Functions("tanh", "tanh", 2.0, 50.0)
     first = pd.read_csv(tmp_path / "whole" / CURVE)["return"][0]
     assert first == pytest.approx(validate(actor, run.scenario, run.validation_episodes)["return"], rel=1e-4)
+    judged = read_pretraining(tmp_path / "whole")
+    assert judged is not None
+    assert list(judged["done"]) == ["after imitating lqr", "after 2 updates through the model"]
+    assert judged["return"].max() == pytest.approx(first, rel=1e-5)  # six digits in both files
+    assert (judged["seconds"].diff()[1:] >= 0).all()
+    kept = (tmp_path / "whole" / PRETRAINING).read_bytes()
+    assert resume(tmp_path / "whole") == "finished"
+    assert (tmp_path / "whole" / PRETRAINING).read_bytes() == kept  # and so is the time that it took
     start_run(run, tmp_path / "killed")
     assert resume(tmp_path / "killed") == "finished"
     assert (tmp_path / "killed" / START).read_bytes() == (tmp_path / "whole" / START).read_bytes()

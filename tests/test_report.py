@@ -5,6 +5,7 @@ import re
 import signal
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,10 @@ from typer.testing import CliRunner
 from baselines.__main__ import app
 from baselines.floors import Random, RandomSettings, Zero, ZeroSettings
 from baselines.registry import POLICIES as CLASSICAL
-from baselines.report import FILES, Wanted, style, write_report
+from baselines.report import FILES, Table, Wanted, style, write_report
 from baselines.report.flight_figures import outage_path
 from baselines.report.flights import Flown
-from baselines.report.results import analyse, significant
+from baselines.report.results import Results, analyse, significant
 from baselines.report.scales import Scale, round_values
 from baselines.report.words import numbers
 from baselines.sweep.flights import BOUND
@@ -234,6 +235,24 @@ def test_no_front_where_none_is_possible(tmp_path: Path) -> None:
     assert "No front and no robustness: sweep: " in page.read_text(encoding="utf-8")
     assert "must be &gt; 0 for a front, got 0" in page.read_text(encoding="utf-8")
     assert len(pd.read_csv(tmp_path / "sweep.csv")) == 0
+
+
+def test_further_tables_stand_on_the_page_and_beside_it(tmp_path: Path) -> None:
+    """The caller makes them of the results; as Markdown, as data and, escaped, as HTML."""
+
+    def tables(results: Sequence[Results]) -> list[Table]:
+        rows = tuple((item.flown.label, f"<{item.best}>") for item in results)
+        return [Table("own", "A table", ("environment", "best, m/s"), rows, "What it means.")]
+
+    (scenario,) = short_scenarios()[1:]
+    write_report({"zero": zero}, [scenario], Wanted(2, sweep_episodes=0), tmp_path, COMMAND, tables=tables)
+    lines = ["| environment | best, m/s |", "| --- | --- |", f"| {scenario.title} | <zero> |", "", "What it means."]
+    assert (tmp_path / "own.md").read_text().splitlines() == lines
+    page = (tmp_path / "report.html").read_text()
+    assert "<h2>A table</h2>" in page
+    assert "&lt;zero&gt;" in page
+    data = json.loads((tmp_path / "report.json").read_text())
+    assert data["tables"][0]["rows"] == [[scenario.title, "<zero>"]]
 
 
 def test_a_failure_leaves_the_old_files(folder: Path, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import json
 import math
 import platform
+from collections.abc import Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from importlib import metadata
@@ -12,6 +13,7 @@ import numpy as np
 
 import formation_env
 from baselines.report.results import Interval, Results
+from baselines.report.table import Table
 from baselines.report.wanted import Wanted
 from baselines.sweep.flights import Sweep
 from formation_env.seeds import seeds
@@ -42,7 +44,9 @@ def versions() -> dict[str, str]:
     return found
 
 
-def document(results: list[Results], sweep: Sweep, wanted: Wanted, command: str) -> dict[str, Any]:
+def document(
+    results: list[Results], sweep: Sweep, wanted: Wanted, command: str, tables: Sequence[Table]
+) -> dict[str, Any]:
     """All that is needed to redo and to judge the report, as plain data."""
     return {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -53,6 +57,7 @@ def document(results: list[Results], sweep: Sweep, wanted: Wanted, command: str)
         "means": "over all seeds; of policies with fewer episodes the reference's plus the paired difference to it",
         "intervals": "bootstrap, 95 %, of the mean",
         "environments": {item.flown.label: _environment(item) for item in results},
+        "tables": [asdict(table) for table in tables],
         "sweep": sweep.as_data(),
     }
 

@@ -11,7 +11,7 @@ from tqdm import tqdm
 from baselines.fuel import regret
 from baselines.report.flights import Flown
 from formation_env.dynamics.base import Array
-from formation_env.evaluation import paired_difference, summarise
+from formation_env.evaluation import bootstrap_interval, paired_difference, summarise
 from formation_env.metrics import METRICS
 
 COMPARED = ("return", "delta_v_m_s", "position_error_mean_m")
@@ -80,6 +80,12 @@ class Results:
     def behind(self, policy: str, other: str) -> Interval:
         """How much more than a compared-with policy another one costs on the seeds of both, m/s."""
         return negative(self.differences[policy][other]["return"])
+
+    def over(self, policy: str, other: str) -> Interval:
+        """Mean cost over another policy's, on the seeds of both."""
+        common = min(self.count(policy), self.count(other))
+        ours, theirs = (-self.flown.episodes[name]["return"].to_numpy(float)[:common] for name in (policy, other))
+        return ratio_of_means(ours, theirs)
 
     def mean(self, policy: str, metric: str) -> float:
         """Mean of a metric."""
@@ -171,6 +177,13 @@ def _difference(episodes: pd.DataFrame, reference: pd.DataFrame, metric: str) ->
     """The paired difference on the seeds that both flew."""
     common = min(len(episodes), len(reference))
     return paired_difference(episodes.iloc[:common], reference.iloc[:common], metric)
+
+
+def ratio_of_means(above: Array, below: Array) -> Interval:
+    """Ratio of the means of paired values (n,), with its 95 % interval: the bootstrap's, of the linearised ratio."""
+    ratio = above.mean() / below.mean()
+    # each pair's share in a small change of the ratio (Cochran 1977, chapter 6)
+    return float(ratio), *bootstrap_interval(ratio + (above - ratio * below) / below.mean())
 
 
 def negative(interval: Interval) -> Interval:

@@ -10,6 +10,7 @@ from baselines.report.flights import Environment, name_environments
 from baselines.report.page import render
 from baselines.report.results import analyse, episode_table, summary_table
 from baselines.report.rounds import fly
+from baselines.report.table import Tables, no_tables
 from baselines.report.wanted import Wanted
 from formation_env.files import write_texts
 
@@ -23,6 +24,7 @@ def write_report(
     out: Path,
     command: str,
     workers: int = 1,
+    tables: Tables = no_tables,
 ) -> Path:
     """Fly policies on environments with the same test seeds, and write the report's files.
 
@@ -33,6 +35,7 @@ def write_report(
         out: folder of `FILES`, of the bounds that were found and of the flights to resume from; made if there is none.
         command: the command line that redoes the report; noted in it.
         workers: processes to fly in; with 1 all is flown in this one.
+        tables: makes further tables of the results; they stand on the page, and as NAME.md beside it.
 
     Returns:
         Path of the HTML page.
@@ -46,7 +49,8 @@ def write_report(
     scenarios = name_environments(envs)
     found = fly(policies, scenarios, wanted, out, workers)
     results = analyse(found.flown, found.bounds)
-    data = document(results, found.sweep, wanted, command)
+    further = tables(results)
+    data = document(results, found.sweep, wanted, command, further)
     contents = (
         episode_table(results).to_csv(index=False),
         summary_table(results).to_csv(index=False),
@@ -54,5 +58,6 @@ def write_report(
         to_json(data),
         render(results, found.sweep, data),
     )
-    write_texts(out, dict(zip(FILES, contents, strict=True)))
+    beside = {f"{table.name}.md": table.markdown() for table in further}
+    write_texts(out, beside | dict(zip(FILES, contents, strict=True)))
     return out / FILES[-1]

@@ -26,12 +26,17 @@ def write_section(path: Path, policy: str, gains: dict[str, Any], comment: str) 
 
 def section(policy: str, gains: dict[str, Any], comment: str) -> str:
     """A policy's section of a gain file, as text with a comment above it."""
+    return commented({policy: gains}, comment)
+
+
+def commented(data: dict[str, Any], comment: str) -> str:
+    """YAML with a comment above it."""
     from ruamel.yaml import YAML
 
     yaml, stream = YAML(typ="safe", pure=True), StringIO()
     yaml.default_flow_style, yaml.width = None, 120
     yaml.width, yaml.sort_base_mapping_type_on_output = 120, False  # type: ignore[assignment]
-    yaml.dump({policy: gains}, stream)
+    yaml.dump(data, stream)
     return "".join(f"# {line}\n" for line in comment.splitlines()) + stream.getvalue()
 
 

@@ -137,7 +137,7 @@ def candidates(
     if not before:
         for known in filter(None, (read(task.gains, task.knobs), present)):
             study.enqueue_trial(known, skip_if_exists=True)
-    return [study.ask(_distributions(task.knobs)).params for _ in range(BATCH)]
+    return [study.ask(distributions(task.knobs)).params for _ in range(BATCH)]
 
 
 def add(study: "Study", knobs: Sequence[Knob], batch: Sequence[dict[str, float]], values: Array) -> None:
@@ -145,7 +145,7 @@ def add(study: "Study", knobs: Sequence[Knob], batch: Sequence[dict[str, float]]
     from optuna.trial import create_trial
 
     for params, value in zip(batch, values, strict=True):
-        study.add_trial(create_trial(params=params, distributions=_distributions(knobs), value=float(value)))
+        study.add_trial(create_trial(params=params, distributions=distributions(knobs), value=float(value)))
 
 
 def open_study(name: str, journal: Path) -> "Study":
@@ -185,7 +185,7 @@ def _cut_torn_line(journal: Path) -> None:
         file.truncate(text.rfind(b"\n") + 1)
 
 
-def _distributions(knobs: Sequence[Knob]) -> dict[str, Any]:
+def distributions(knobs: Sequence[Knob]) -> dict[str, Any]:
     """The knobs' limits, as Optuna wants them."""
     from optuna.distributions import FloatDistribution
 

@@ -1,0 +1,1 @@
+"""Search of hyperparameters: trainings from one pretrained actor, judged on validation seeds."""
