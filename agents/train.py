@@ -19,7 +19,7 @@ from agents.actor import Functions, to_bytes
 from agents.checkpoint import State, load_checkpoint, restore
 from agents.models import make_env, make_model
 from agents.pretraining.pretrain import pretrain
-from agents.runs import CHECKPOINT, PRETRAINING, START, TENSORBOARD, Run, load_run, start_run
+from agents.runs import CHECKPOINT, PRETRAINING, START, TENSORBOARD, Run, load_run, start_file, start_run
 from agents.start import start_from
 from agents.validation import Outcome, Validation
 from formation_env.files import write_files
@@ -64,8 +64,9 @@ def train(run: Run, folder: Path, time_limit_s: float = math.inf, give_up: Calla
         OSError: the folder cannot be written.
     """
     training_seeds(run.seed, run.agent.rows)
-    if run.agent.pretraining is None or run.start:
-        model = _new_model(run, Path(run.start) if run.start else None)
+    start = start_file(run)
+    if run.agent.pretraining is None or start:
+        model = _new_model(run, start)
         start_run(run, folder)
     else:
         start_run(run, folder)

@@ -18,6 +18,7 @@ from agents.start import start_from
 from agents.train import resume, train
 from agents.validation import validate
 from formation_env.observation import SIZE
+from formation_env.settings import ConfigError
 
 
 @pytest.mark.parametrize(
@@ -137,3 +138,17 @@ def test_a_run_is_pretrained_once(algorithm: str, tmp_path: Path) -> None:
     assert resume(tmp_path / "killed") == "finished"
     assert (tmp_path / "killed" / START).read_bytes() == (tmp_path / "whole" / START).read_bytes()
     assert (tmp_path / "killed" / BEST).read_bytes() == (tmp_path / "whole" / BEST).read_bytes()
+
+
+def test_two_algorithms_share_a_pretrained_actor(tmp_path: Path) -> None:
+    """SAC starts from the folder of PPO's run, keeps how the actor came about, and refuses another seed's."""
+    first = small_run(tmp_path, "ppo", PRETRAINED)
+    train(first, tmp_path / "ppo")
+    second = small_run(tmp_path, "sac", PRETRAINED, start=tmp_path / "ppo")
+    second = replace(second, agent=replace(second.agent, network=first.agent.network))
+    train(second, tmp_path / "sac")
+    for name in (START, PRETRAINING):
+        assert (tmp_path / "sac" / name).read_bytes() == (tmp_path / "ppo" / name).read_bytes()
+    with pytest.raises(ConfigError, match="seed: must be this run's, 1, got 0"):
+        train(replace(second, seed=1), tmp_path / "other")
+    assert not (tmp_path / "other").exists()
