@@ -67,7 +67,9 @@ def train(
     seed: Annotated[int, typer.Option(min=0, help="Of the network, the exploration and the episodes.")] = 0,
     steps: Annotated[int | None, typer.Option(min=1, help="Environment steps; else as in the file.")] = None,
     out: Annotated[Path | None, typer.Option(help="New folder of the run; else runs/ALGORITHM_ENV_seedN.")] = None,
-    start: Annotated[Path | None, typer.Option(help="Actor (.safetensors) to start from, not random weights.")] = None,
+    start: Annotated[
+        Path | None, typer.Option(help="Actor (.safetensors), or run, whose pretrained actor to start from.")
+    ] = None,
     resume: Annotated[Path | None, typer.Option(help="Folder of a run to go on with; all else is as it was.")] = None,
     time_limit: Annotated[float, typer.Option(min=0, help="Minutes after which to save and stop.")] = math.inf,
     rows: Annotated[int | None, typer.Option(min=1, help="Environments side by side; else as in the file.")] = None,

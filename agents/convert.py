@@ -8,7 +8,7 @@ import torch
 from stable_baselines3.common.base_class import BaseAlgorithm
 
 from agents.actor import Actor, Functions, Layer
-from agents.models import ACTIVATIONS
+from agents.models import ACTIVATIONS, SquashedPolicy
 from formation_env.scenario import Scenario
 from formation_env.settings import ConfigError
 
@@ -19,7 +19,7 @@ ACTORS: Final = (("mlp_extractor.policy_net", "action_net"), ("actor.latent_pi",
 
 
 def actor_of(model: BaseAlgorithm, throttle_power: float, scenario: Scenario) -> Actor:
-    """The actor of an SB3 model with SB3's "MlpPolicy".
+    """The actor of an SB3 model with SB3's "MlpPolicy" or ours.
 
     Args:
         model: PPO, A2C or SAC.
@@ -31,7 +31,7 @@ def actor_of(model: BaseAlgorithm, throttle_power: float, scenario: Scenario) ->
     """
     names = {kind: name for name, kind in ACTIVATIONS.items()}
     activation = names.get(getattr(model.policy, "activation_fn", None), "unknown")
-    squash = "tanh" if model.policy.squash_output else "clip"
+    squash = "tanh" if model.policy.squash_output or isinstance(model.policy, SquashedPolicy) else "clip"
     magnification = model.policy.features_extractor_kwargs.get("magnification", 1.0)
     functions = Functions(activation, squash, throttle_power, magnification)
     return Actor(layers_of(model.policy.state_dict()), functions, scenario)

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.noise import ActionNoise
+from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
+from stable_baselines3.common.type_aliases import Schedule
 from stable_baselines3.common.utils import LinearSchedule, update_learning_rate
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from torch import nn
@@ -37,6 +39,14 @@ class Magnifier(BaseFeaturesExtractor):
     def forward(self, observations: torch.Tensor) -> torch.Tensor:
         """Features (rows, SIZE) of observations (rows, SIZE)."""
         return (observations * self.factors).clamp(-CUT, CUT)
+
+
+class SquashedPolicy(ActorCriticPolicy):
+    """SB3's "MlpPolicy" for PPO, its mean brought to [-1, 1] by tanh as SAC's is: one pretrained actor serves both."""
+
+    def _build(self, lr_schedule: Schedule) -> None:
+        super()._build(lr_schedule)
+        self.action_net.register_forward_hook(lambda layer, given, mean: mean.tanh())
 
 
 class CriticFirstPPO(PPO):
@@ -105,7 +115,7 @@ def make_model(agent: AgentSettings, env: VecEnv, seed: int) -> BaseAlgorithm:
 
 def _ppo(agent: PPOSettings, env: VecEnv, seed: int) -> PPO:
     model = CriticFirstPPO(
-        "MlpPolicy",
+        SquashedPolicy,
         env,
         n_steps=agent.rollout_steps,
         batch_size=agent.batch_size,

@@ -35,7 +35,7 @@ def plan_run(
         validations: how many over the run.
         validation_episodes: episodes of each.
         threads: of torch.
-        start: an actor to start from.
+        start: an actor to start from: its file, or the folder of a run that was pretrained in the same way.
         command: the command line, to be noted.
 
     Raises:

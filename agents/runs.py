@@ -28,6 +28,8 @@ RUN: Final = "settings.json"
 CURVE: Final = "validation.csv"
 PRETRAINING: Final = "pretraining.csv"
 """What came before, if anything did: done, seconds and return of each judgement; the last one is its end."""
+PRETRAINED_BY: Final = ("pretraining", "network", "throttle_power", "magnification")
+"""Hyperparameters that a pretrained actor depends on."""
 TENSORBOARD: Final = "tensorboard"
 
 LIBRARIES: Final = ("formation-env", "gymnasium", "numpy", "stable-baselines3", "torch")
@@ -47,7 +49,7 @@ class Run:
         threads: of torch; other numbers give other rounding.
         agent: the hyperparameters.
         scenario: what is flown.
-        start: path of the actor that it starts from, if it does from one.
+        start: path of the actor that it starts from, or of the run whose pretrained actor that is, if it does.
         command: the command line.
         versions: of the libraries, and the revision of the sources.
     """
@@ -92,8 +94,33 @@ def start_run(run: Run, folder: Path) -> None:
         raise ConfigError(f"{folder}: holds a run already; go on with --resume {folder}, or give another folder")
     files = {RUN: (json.dumps(asdict(run), indent=2) + "\n").encode()}
     if run.start:
-        files[START] = Path(run.start).read_bytes()
+        files |= _given(Path(run.start))
     write_files(folder, files)
+
+
+def _given(start: Path) -> dict[str, bytes]:
+    """What a run takes from its start: an actor's file, or another run's pretrained actor and how it came about."""
+    if not start.is_dir():
+        return {START: start.read_bytes()}
+    return {name: (start / name).read_bytes() for name in (START, PRETRAINING)}
+
+
+def start_file(run: Run) -> Path | None:
+    """The file of the actor that a run starts from, if one is given.
+
+    Raises:
+        ConfigError: it is another run's, which was pretrained in another way.
+    """
+    start = Path(run.start)
+    if not run.start or not start.is_dir():
+        return start if run.start else None
+    theirs = load_run(start)
+    pairs = {key: (getattr(run, key), getattr(theirs, key)) for key in ("scenario", "seed")}
+    pairs |= {key: (getattr(run.agent, key), getattr(theirs.agent, key)) for key in PRETRAINED_BY}
+    for key, (wanted, got) in pairs.items():
+        if wanted != got:
+            raise ConfigError(f"{start}: {key}: must be this run's, {wanted}, got {got}")
+    return start / START
 
 
 def load_run(folder: Path) -> Run:

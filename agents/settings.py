@@ -188,8 +188,6 @@ class SACSettings(CommonSettings):
 
 AgentSettings = PPOSettings | SACSettings
 SETTINGS: Final[dict[str, type[PPOSettings] | type[SACSettings]]] = {"ppo": PPOSettings, "sac": SACSettings}
-SQUASH_OF: Final[dict[str, str]] = {"ppo": "clip", "sac": "tanh"}
-"""How an algorithm brings a network's output to [-1, 1], see `agents.actor`."""
 OVERRIDES: Final = "environments"
 """Key of a file under which environments have hyperparameters of their own."""
 

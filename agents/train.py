@@ -19,8 +19,7 @@ from agents.actor import Functions, to_bytes
 from agents.checkpoint import State, load_checkpoint, restore
 from agents.models import make_env, make_model
 from agents.pretraining.pretrain import pretrain
-from agents.runs import CHECKPOINT, PRETRAINING, START, TENSORBOARD, Run, load_run, start_run
-from agents.settings import SQUASH_OF
+from agents.runs import CHECKPOINT, PRETRAINING, START, TENSORBOARD, Run, load_run, start_file, start_run
 from agents.start import start_from
 from agents.validation import Outcome, Validation
 from formation_env.files import write_files
@@ -65,8 +64,9 @@ def train(run: Run, folder: Path, time_limit_s: float = math.inf, give_up: Calla
         OSError: the folder cannot be written.
     """
     training_seeds(run.seed, run.agent.rows)
-    if run.agent.pretraining is None or run.start:
-        model = _new_model(run, Path(run.start) if run.start else None)
+    start = start_file(run)
+    if run.agent.pretraining is None or start:
+        model = _new_model(run, start)
         start_run(run, folder)
     else:
         start_run(run, folder)
@@ -101,9 +101,7 @@ def pretrained(run: Run, folder: Path) -> Path:
     path, agent = folder / START, run.agent
     if agent.pretraining is not None and not path.exists():
         torch.set_num_threads(run.threads)
-        functions = Functions(
-            agent.network.activation, SQUASH_OF[run.algorithm], agent.throttle_power, agent.magnification
-        )
+        functions = Functions(agent.network.activation, "tanh", agent.throttle_power, agent.magnification)
         told = Judgements(run.validation_episodes)
         actor = pretrain(
             agent.pretraining, agent.network, functions, run.scenario, run.seed, run.validation_episodes, told.note

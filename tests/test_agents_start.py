@@ -18,25 +18,24 @@ from agents.start import start_from
 from agents.train import resume, train
 from agents.validation import validate
 from formation_env.observation import SIZE
+from formation_env.settings import ConfigError
 
 
 @pytest.mark.parametrize(
-    ("algorithm", "squash", "activation", "agent"),
+    ("algorithm", "activation", "agent"),
     [
-        ("ppo", "clip", "tanh", ""),
-        ("ppo", "clip", "tanh", "use_sde: true"),
-        ("sac", "tanh", "relu", ""),
-        ("sac", "tanh", "relu", "use_sde: true"),
+        ("ppo", "tanh", ""),
+        ("ppo", "tanh", "use_sde: true"),
+        ("sac", "relu", ""),
+        ("sac", "relu", "use_sde: true"),
     ],
 )
-def test_a_start_flies_as_the_file_says(
-    algorithm: str, squash: str, activation: str, agent: str, tmp_path: Path
-) -> None:
+def test_a_start_flies_as_the_file_says(algorithm: str, activation: str, agent: str, tmp_path: Path) -> None:
     """The first deterministic actions are those of the file; noise and critics are the seed's, as without it."""
     run = small_run(tmp_path, algorithm, agent)
     run = replace(run, agent=replace(run.agent, network=replace(run.agent.network, activation=activation)))
     path = tmp_path / "actor.safetensors"
-    path.write_bytes(to_bytes(given := random_actor(squash, activation)))
+    path.write_bytes(to_bytes(given := random_actor("tanh", activation)))
     env = make_env(run.agent, run.scenario)
     fresh, started = make_model(run.agent, env, 0), make_model(run.agent, env, 0)
     start_from(path, started, run.agent, run.scenario)
@@ -53,13 +52,13 @@ def test_a_start_flies_as_the_file_says(
 @pytest.mark.parametrize(
     ("actor", "fault"),
     [
-        (random_actor("clip", width=9), "hidden: must be [8], by algorithm and hyperparameters, got [9]"),
+        (random_actor("tanh", width=9), "hidden: must be [8], by algorithm and hyperparameters, got [9]"),
         (
-            random_actor("clip", activation="relu"),
+            random_actor("tanh", activation="relu"),
             "activation: must be tanh",
         ),
-        (random_actor("tanh"), "squash: must be clip"),
-        (random_actor("clip", power=3.0), "throttle_power: must be 2.0"),
+        (random_actor("clip"), "squash: must be tanh"),
+        (random_actor("tanh", power=3.0), "throttle_power: must be 2.0"),
         (None, "cannot be read"),
     ],
 )
@@ -76,13 +75,13 @@ def test_a_start_that_does_not_fit_is_one_line(tmp_path: Path, actor: Actor | No
 def test_a_run_from_a_start_is_noted_with_it(tmp_path: Path) -> None:
     """The curve begins with the file's actor, of which the run keeps a copy; and learning changes it."""
     path = tmp_path / "actor.safetensors"
-    path.write_bytes(to_bytes(random_actor("clip")))
+    path.write_bytes(to_bytes(random_actor("tanh")))
     run = small_run(tmp_path, "ppo", start=path)
     train(run, tmp_path / "run")
     assert (tmp_path / "run" / START).read_bytes() == path.read_bytes()
     assert load_run(tmp_path / "run").start == str(path)
     last = load_checkpoint(tmp_path / "run" / CHECKPOINT)["parameters"]["policy"]
-    assert not np.array_equal(last["action_net.weight"].numpy(), random_actor("clip").layers[-1][0])
+    assert not np.array_equal(last["action_net.weight"].numpy(), random_actor("tanh").layers[-1][0])
 
 
 def learnt(run: Run, folder: Path) -> tuple[dict[str, torch.Tensor], dict[str, torch.Tensor]]:
@@ -118,13 +117,13 @@ def test_exploration_does_not_fall_below_its_limit(tmp_path: Path) -> None:
     assert (after["log_std"] == -2).all()
 
 
-@pytest.mark.parametrize(("algorithm", "squash"), [("ppo", "clip"), ("sac", "tanh")])
-def test_a_run_is_pretrained_once(algorithm: str, squash: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("algorithm", ["ppo", "sac"])
+def test_a_run_is_pretrained_once(algorithm: str, tmp_path: Path) -> None:
     """The curve begins with the best of the judged; killed before there was an actor, the run makes the same again."""
     run = small_run(tmp_path, algorithm, PRETRAINED)
     train(run, tmp_path / "whole")
     actor = read_actor(tmp_path / "whole" / START, run.scenario)
-    assert actor.functions == Functions("tanh", squash, 2.0, 50.0)
+    assert actor.functions == Functions("tanh", "tanh", 2.0, 50.0)
     first = pd.read_csv(tmp_path / "whole" / CURVE)["return"][0]
     assert first == pytest.approx(validate(actor, run.scenario, run.validation_episodes)["return"], rel=1e-4)
     judged = read_pretraining(tmp_path / "whole")
@@ -139,3 +138,17 @@ def test_a_run_is_pretrained_once(algorithm: str, squash: str, tmp_path: Path) -
     assert resume(tmp_path / "killed") == "finished"
     assert (tmp_path / "killed" / START).read_bytes() == (tmp_path / "whole" / START).read_bytes()
     assert (tmp_path / "killed" / BEST).read_bytes() == (tmp_path / "whole" / BEST).read_bytes()
+
+
+def test_two_algorithms_share_a_pretrained_actor(tmp_path: Path) -> None:
+    """SAC starts from the folder of PPO's run, keeps how the actor came about, and refuses another seed's."""
+    first = small_run(tmp_path, "ppo", PRETRAINED)
+    train(first, tmp_path / "ppo")
+    second = small_run(tmp_path, "sac", PRETRAINED, start=tmp_path / "ppo")
+    second = replace(second, agent=replace(second.agent, network=first.agent.network))
+    train(second, tmp_path / "sac")
+    for name in (START, PRETRAINING):
+        assert (tmp_path / "sac" / name).read_bytes() == (tmp_path / "ppo" / name).read_bytes()
+    with pytest.raises(ConfigError, match="seed: must be this run's, 1, got 0"):
+        train(replace(second, seed=1), tmp_path / "other")
+    assert not (tmp_path / "other").exists()

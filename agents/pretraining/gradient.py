@@ -5,7 +5,7 @@ network's weights, and backpropagation through time gives the cost's gradient. I
 gradient of reinforcement learning, but has no noise of exploration in it.
 """
 
-from dataclasses import dataclass
+import math
 from typing import Any, Final
 
 import numpy as np
@@ -24,29 +24,9 @@ SMOOTH_THROTTLE: Final = 1e-5
 """The same for thrusts, in units of the greatest."""
 
 
-@dataclass(frozen=True)
-class Output:
-    """From a network's output to the thrust.
-
-    Attributes:
-        squash: `clip` or `tanh`, to [-1, 1].
-        throttle_power: p of the thrust sign(z) |z|^p.
-    """
-
-    squash: str
-    throttle_power: float
-
-    def throttle(self, out: Tensor) -> Tensor:
-        """Throttles z (..., 3) in [-1, 1] for outputs (..., 3)."""
-        return out.tanh() if self.squash == "tanh" else out.clamp(-1, 1)
-
-    def of_throttle(self, z: Tensor) -> Tensor:
-        """Actions (..., 3) for throttles."""
-        return z * z.abs() ** (self.throttle_power - 1)
-
-    def thrust(self, out: Tensor) -> Tensor:
-        """Actions (..., 3) for outputs (..., 3)."""
-        return self.of_throttle(self.throttle(out))
+def thrust_of(z: Tensor, throttle_power: float) -> Tensor:
+    """Actions sign(z) |z|^p for throttles z of any shape, as `agents.throttle` has them."""
+    return z * z.abs() ** (throttle_power - 1)
 
 
 class ModelEpisodes:
@@ -58,56 +38,62 @@ class ModelEpisodes:
     def __init__(self, recording: Recording, magnification: float) -> None:
         scenario = recording.scenario
         self.rows, self.steps = recording.starts.shape[0], scenario.num_steps
-        self._magnification = magnification
         self._scenario = scenario
         table, model = build_schedule(scenario), scenario.true_model()
-        self._Phi, self._Gamma, self._delta = (
-            _tensor(np.broadcast_to(part, (self.steps, *part.shape[-rank:])))
+        Phi, Gamma, delta = (
+            np.broadcast_to(part, (self.steps, *part.shape[-rank:]))
             for part, rank in ((model.Phi, 2), (model.Gamma, 2), (model.delta, 1))
         )
-        self._A, self._b = _tensor(_coasts(table)), _tensor(_columns(table, "coast_offset"))
-        self._r, self._scored = _tensor(_columns(table, "reference")), _tensor(_columns(table, "scored_position"))
-        self._price = table[:, OFFSETS["error_price"]].tolist()
-        self._scale = _tensor(observation_layout(scenario).state_scale)
-        self._log_unit = _tensor(np.repeat([LOG_UNIT_POS_M, LOG_UNIT_VEL_M_S], 3))
-        self._starts, self._pushes = _tensor(recording.starts), _tensor(recording.pushes)
-        self._errors, self._rest = _tensor(recording.estimate_errors), _tensor(recording.rest)
+        # x' = [Phi, Gamma u_max] [x; action] + push, for rows of states
+        self._motion = _tensor(np.concatenate([Phi, scenario.spacecraft.max_accel_m_s2 * Gamma], axis=2).swapaxes(1, 2))
+        self._pushes = _tensor(recording.pushes + delta[:, None])
+        # both errors, (x_hat - r, A x_hat + b), in units of the logarithms
+        unit = np.tile(np.repeat([LOG_UNIT_POS_M, LOG_UNIT_VEL_M_S], 3), 2)
+        A, b, r = _coasts(table), _columns(table, "coast_offset"), _columns(table, "reference")
+        matrices = np.concatenate([np.broadcast_to(np.eye(6), A.shape), A], axis=1) / unit[:, None]
+        self._both, self._offset = _tensor(matrices.swapaxes(1, 2)), _tensor(np.concatenate([-r, b], axis=1) / unit)
+        self._linear = _tensor(magnification * unit / np.tile(observation_layout(scenario).state_scale, 2))
+        self._price, self._scored = (
+            _tensor(table[:, OFFSETS["error_price"]]),
+            _tensor(_columns(table, "scored_position")),
+        )
+        self._starts, self._errors = _tensor(recording.starts), _tensor(recording.estimate_errors)
+        self._rest = _tensor(recording.rest)
 
-    def cost(self, network: nn.Module, output: Output, rows: Any) -> Tensor:
+    def cost(self, network: nn.Module, throttle_power: float, rows: Any) -> Tensor:
         """Mean cost of some rows' episodes, m/s: minus the environment's return.
 
         Args:
-            network: from features (rows, SIZE) to outputs (rows, 3).
-            output: what the outputs stand for.
+            network: from features (rows, SIZE) to throttles before the tanh (rows, 3).
+            throttle_power: p of the thrust that a throttle stands for.
             rows: which, any index of tensors.
         """
-        spacecraft, dt_s = self._scenario.spacecraft, self._scenario.dt_s
         x, pushes, errors, rest = self._starts[rows], self._pushes[:, rows], self._errors[:, rows], self._rest[:, rows]
-        thrusts, error_cost = [], torch.zeros(())
+        actions, positions = list[Tensor](), list[Tensor]()
         for step in range(self.steps):
-            action = output.thrust(network(self._features(step, x + errors[step], rest[step])))
-            push = (spacecraft.max_accel_m_s2 * action) @ self._Gamma[step].T
-            x = x @ self._Phi[step].T + push + self._delta[step] + pushes[step]
-            thrusts.append(action)
-            if self._price[step + 1]:
-                error_cost = error_cost + self._price[step + 1] * self._judged(x[:, :3] - self._scored[step + 1])
-        delta_v = _norm(torch.stack(thrusts), SMOOTH_THROTTLE).mean(dim=1).sum() * spacecraft.max_accel_m_s2 * dt_s
-        return delta_v + error_cost
+            z = network(self._features(step, x + errors[step], rest[step])).tanh()
+            action = thrust_of(z, throttle_power)
+            x = torch.addmm(pushes[step], torch.cat([x, action], dim=1), self._motion[step])
+            actions.append(action)
+            positions.append(x[:, :3])
+        impulse = self._scenario.spacecraft.max_accel_m_s2 * self._scenario.dt_s
+        misses = torch.stack(positions) - self._scored[1:, None]
+        return impulse * _norm(torch.stack(actions), SMOOTH_THROTTLE).mean(dim=1).sum() + (
+            self._price[1:] @ self._judged(misses).mean(dim=1)
+        )
 
-    def _judged(self, error: Tensor) -> Tensor:
-        """Mean over the rows of what the reward counts of position errors (rows, 3), m."""
+    def _judged(self, misses: Tensor) -> Tensor:
+        """What the reward counts of position errors (..., 3), m."""
         reward = self._scenario.reward
         if reward.shape == "quadratic":
-            return (error**2).sum(dim=-1).mean() / reward.quadratic_scale_m
-        return _norm(error, SMOOTH_M).mean()
+            return (misses**2).sum(dim=-1) / reward.quadratic_scale_m
+        return _norm(misses, SMOOTH_M)
 
     def _features(self, step: int, x_hat: Tensor, rest: Tensor) -> Tensor:
         """What the network reads (rows, SIZE), as the environment and `agents.features` make it."""
-        error, arrival = x_hat - self._r[step], x_hat @ self._A[step].T + self._b[step]
-        both = torch.cat([error, arrival], dim=-1)
-        linear = self._magnification * both / self._scale.repeat(2)
-        logs = both.sign() * torch.log1p(both.abs() / self._log_unit.repeat(2)) / np.log1p(LOG_RANGE)
-        return torch.cat([linear, logs, rest], dim=-1).clamp(-CUT, CUT)
+        both = torch.addmm(self._offset[step], x_hat, self._both[step])
+        logs = both.sign() * torch.log1p(both.abs()) / math.log1p(LOG_RANGE)
+        return torch.cat([both * self._linear, logs, rest], dim=1).clamp(-CUT, CUT)
 
 
 def _norm(vectors: Tensor, smooth: float) -> Tensor:

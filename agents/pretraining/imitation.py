@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from agents.features import features
-from agents.pretraining.gradient import Output
+from agents.pretraining.gradient import thrust_of
 from formation_env.envs import FormationVectorEnv
 from formation_env.evaluation import Policy
 from formation_env.scenario import Scenario
@@ -27,7 +27,7 @@ _SHAKE: Final = 0.5
 
 def imitate(
     network: nn.Module,
-    output: Output,
+    throttle_power: float,
     teacher: Policy,
     scenario: Scenario,
     rounds: Sequence[Sequence[int]],
@@ -38,8 +38,8 @@ def imitate(
     """Fit a network to a teacher's actions. The first round is flown by the teacher, the others by the network.
 
     Args:
-        network: from features (rows, SIZE) to outputs (rows, 3); fitted in place.
-        output: what the outputs stand for.
+        network: from features (rows, SIZE) to throttles before the tanh (rows, 3); fitted in place.
+        throttle_power: p of the thrust that a throttle stands for.
         teacher: whose actions are the goal.
         scenario: what is flown.
         rounds: seeds of each round's episodes.
@@ -52,30 +52,30 @@ def imitate(
     seen, wanted = list[Tensor](), list[Tensor]()
     for index, seeds in enumerate(rounds):
         flown_by = None if index == 0 else network
-        for shown, action in _fly(flown_by, output, teacher, scenario, seeds, magnification, generator):
+        for shown, action in _fly(flown_by, throttle_power, teacher, scenario, seeds, magnification, generator):
             seen.append(shown)
             wanted.append(action)
         inputs, actions = torch.cat(seen), torch.cat(wanted)
         for _ in range(EPOCHS):
-            _fit(network, output, optimizer, inputs, actions, generator)
+            _fit(network, throttle_power, optimizer, inputs, actions, generator)
             schedule.step()
         progress(1)
 
 
 def _fit(
     network: nn.Module,
-    output: Output,
+    throttle_power: float,
     optimizer: torch.optim.Optimizer,
     inputs: Tensor,
     actions: Tensor,
     generator: np.random.Generator,
 ) -> None:
     """One pass over the samples."""
-    throttles = actions.sign() * actions.abs() ** (1 / output.throttle_power)
+    throttles = actions.sign() * actions.abs() ** (1 / throttle_power)
     for rows in torch.as_tensor(generator.permutation(len(inputs))).split(BATCH):
-        z = output.throttle(network(inputs[rows]))
+        z = network(inputs[rows]).tanh()
         loss = ((z - throttles[rows]) ** 2).mean()
-        loss = loss + THRUST_WEIGHT * ((output.of_throttle(z) - actions[rows]) ** 2).mean()
+        loss = loss + THRUST_WEIGHT * ((thrust_of(z, throttle_power) - actions[rows]) ** 2).mean()
         optimizer.zero_grad()
         loss.backward()
         optimizer.step()
@@ -83,7 +83,7 @@ def _fit(
 
 def _fly(
     network: nn.Module | None,
-    output: Output,
+    throttle_power: float,
     teacher: Policy,
     scenario: Scenario,
     seeds: Sequence[int],
@@ -101,6 +101,6 @@ def _fly(
             flown = wanted + _SHAKE * np.abs(wanted) * generator.standard_normal(wanted.shape, np.float32)
         else:
             with torch.no_grad():
-                flown = output.thrust(network(shown)).numpy()
+                flown = thrust_of(network(shown).tanh(), throttle_power).numpy()
         observations = env.step(np.clip(flown, -1, 1))[0]
     return samples

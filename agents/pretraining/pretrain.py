@@ -12,7 +12,7 @@ from torch import nn
 
 from agents.actor import Actor, Functions
 from agents.models import ACTIVATIONS
-from agents.pretraining.gradient import ModelEpisodes, Output
+from agents.pretraining.gradient import ModelEpisodes
 from agents.pretraining.imitation import imitate
 from agents.pretraining.recording import record_disturbances
 from agents.settings import Network, Pretraining
@@ -55,7 +55,7 @@ def pretrain(
     Raises:
         ConfigError: no teacher of that name, or a nonlinear truth where the gradient is wanted.
     """
-    generator, output = np.random.default_rng(seed), Output(functions.squash, functions.throttle_power)
+    generator, power = np.random.default_rng(seed), functions.throttle_power
     net = _network(network, seed)
     episodes = _training_seeds(how, seed)
     best, least = copy.deepcopy(net), math.inf
@@ -71,18 +71,18 @@ def pretrain(
     if how.rounds:
         teacher = make_policy(how.teacher, scenario)
         rounds = [episodes[how.rows * i : how.rows * (i + 1)] for i in range(how.rounds)]
-        imitate(net, output, teacher, scenario, rounds, functions.magnification, generator)
+        imitate(net, power, teacher, scenario, rounds, functions.magnification, generator)
         judge(f"after imitating {how.teacher}")
     if how.updates:
         recorded = episodes[how.rows * how.rounds :]
         model = ModelEpisodes(record_disturbances(scenario, recorded), functions.magnification)
-        descend(net, output, model, how, generator, judge)
+        descend(net, power, model, how, generator, judge)
     return _actor(best, functions, scenario)
 
 
 def descend(
     net: nn.Module,
-    output: Output,
+    throttle_power: float,
     model: ModelEpisodes,
     how: Pretraining,
     generator: np.random.Generator,
@@ -92,26 +92,42 @@ def descend(
 
     Args:
         net: from features to outputs; changed in place.
-        output: what the outputs stand for.
+        throttle_power: p of the thrust sign(z) |z|^p that the outputs' z = tanh stands for.
         model: the episodes.
         how: how many updates, of which size.
         generator: chooses the episodes of each.
         judge: called with a text from time to time, and at the end.
     """
-    optimizer = torch.optim.Adam(net.parameters(), how.learning_rate)
-    schedule = torch.optim.lr_scheduler.LambdaLR(
-        optimizer, lambda k: min(1.0, (k + 1) / _WARM_UP) * (0.505 + 0.495 * math.cos(math.pi * k / how.updates))
-    )
+    optimizers = _optimizers(net, how.learning_rate)
+    schedules = [
+        torch.optim.lr_scheduler.LambdaLR(optimizer, lambda k: _share(k, how.updates)) for optimizer in optimizers
+    ]
     for update in range(1, how.updates + 1):
         rows = torch.as_tensor(generator.choice(model.rows, min(how.batch, model.rows), replace=False))
-        cost = model.cost(net, output, rows)
-        optimizer.zero_grad()
-        cost.backward()
+        net.zero_grad()
+        model.cost(net, throttle_power, rows).backward()
         nn.utils.clip_grad_norm_(net.parameters(), _MAX_NORM)
-        optimizer.step()
-        schedule.step()
+        for optimizer, schedule in zip(optimizers, schedules, strict=True):
+            optimizer.step()
+            schedule.step()
         if update % UPDATES_A_JUDGEMENT == 0 or update == how.updates:
             judge(f"after {update} updates through the model")
+
+
+def _optimizers(net: nn.Module, learning_rate: float) -> list[torch.optim.Optimizer]:
+    """Muon (Jordan et al. 2024) for weights: it gives all directions of a matrix the same step, the weak ones, too.
+
+    It has no rule for biases, which Adam takes.
+    """
+    weights = [part for part in net.parameters() if part.ndim > 1]
+    biases = [part for part in net.parameters() if part.ndim == 1]
+    muon = torch.optim.Muon(weights, learning_rate, weight_decay=0.0, adjust_lr_fn="match_rms_adamw")
+    return [muon, torch.optim.Adam(biases, learning_rate)]
+
+
+def _share(update: int, updates: int) -> float:
+    """Of the greatest learning rate: up within `_WARM_UP` updates, then down to nearly nothing with the cosine."""
+    return min(1.0, (update + 1) / _WARM_UP) * (0.505 + 0.495 * math.cos(math.pi * update / updates))
 
 
 def _network(network: Network, seed: int) -> nn.Sequential:
