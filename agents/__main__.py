@@ -129,7 +129,7 @@ def tune(
     study: Annotated[
         Path | None, typer.Option(file_okay=False, help="Folder to go on with; else runs/tuning/ALGORITHM_ENV.")
     ] = None,
-    start: Annotated[Path | None, typer.Option(help="Actor that all start from; else it is pretrained once.")] = None,
+    start: Annotated[Path | None, typer.Option(help="As of train, for all; else they are pretrained once.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="As of train.")] = 0,
     rows: Annotated[int | None, typer.Option(min=1, help="Environments side by side; else as in the file.")] = None,
     validations: Annotated[int, typer.Option(min=1, help="Of each trial; there it may be given up.")] = 8,

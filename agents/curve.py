@@ -8,6 +8,7 @@ from typing import Final
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from agents.evaluate import least_costs
@@ -23,6 +24,8 @@ from formation_env.settings import ConfigError
 
 DASHES: Final = {"solid": "-", "dash": "--", "dot": ":", "dashdot": "-."}
 """The report's dashes, as matplotlib calls them."""
+PRETRAINING: Final = "#333333"
+"""Colour of what all algorithms have in common."""
 
 
 @dataclass(frozen=True)
@@ -117,11 +120,13 @@ def levels_of(run: Run, baselines: Sequence[str], bounds: Path) -> Levels:
 def figure_of(runs: Sequence[Learnt], levels: Levels) -> Figure:
     """Pretraining on the left, if any run knows of it, and what came then on the right."""
     figure = Figure(figsize=(8.0, 4.8), layout="constrained")
-    known = any(learnt.pretraining is not None for learnt in runs)
-    parts: list[Axes] = list(figure.subplots(1, 1 + known, sharey=True, squeeze=False)[0])
+    known = [learnt.pretraining for learnt in runs if learnt.pretraining is not None]
+    parts: list[Axes] = list(figure.subplots(1, 2 if known else 1, sharey=True, squeeze=False)[0])
     floor = levels.bound or 0.0
+    for judgements in known:
+        _plot(parts[0], judgements, floor, PRETRAINING)
     for algorithm in (name for name in ALGORITHMS if any(learnt.run.algorithm == name for learnt in runs)):
-        _plot_runs(parts, [learnt for learnt in runs if learnt.run.algorithm == algorithm], floor)
+        _plot_runs(parts[-1], [learnt for learnt in runs if learnt.run.algorithm == algorithm], floor)
     for name, look in looks(levels.classical).items():
         for axes in parts:
             level = levels.classical[name]
@@ -131,18 +136,19 @@ def figure_of(runs: Sequence[Learnt], levels: Levels) -> Figure:
     return figure
 
 
-def _plot_runs(parts: Sequence[Axes], runs: Sequence[Learnt], floor: float) -> None:
-    """The lines of one algorithm's runs, m/s above the floor over minutes; the last of the parts has the RL."""
+def _plot_runs(axes: Axes, runs: Sequence[Learnt], floor: float) -> None:
+    """The lines of one algorithm's runs; the first stands in the legend for all."""
     algorithm, steps = runs[0].run.algorithm, runs[0].run.steps
     best = min(-learnt.curve["return"].max() for learnt in runs)
-    label = f"{algorithm}, {len(runs)} × {steps:,} steps, best {best:.4g} m/s"
-    look = looks(ALGORITHMS)[algorithm]
-    for learnt in runs:
-        for axes, lines in ((parts[0], learnt.pretraining), (parts[-1], learnt.curve)):
-            if lines is not None:
-                (line,) = axes.plot(lines["seconds"] / 60, -lines["return"] - floor, color=look.color, linewidth=0.9)
-                line.set(marker=".", markersize=3, linestyle=DASHES[look.dash])
-        line.set_label(label if learnt is runs[0] else "_")
+    lines = [_plot(axes, learnt.curve, floor, looks(ALGORITHMS)[algorithm].color) for learnt in runs]
+    lines[0].set_label(f"{algorithm}, {len(runs)} × {steps:,} steps, best {best:.4g} m/s")
+
+
+def _plot(axes: Axes, table: pd.DataFrame, floor: float, color: str) -> Line2D:
+    """Cost above the floor, m/s, over minutes."""
+    (line,) = axes.plot(table["seconds"] / 60, -table["return"] - floor, color=color, linewidth=0.9)
+    line.set(marker=".", markersize=3)
+    return line
 
 
 def _describe(figure: Figure, parts: Sequence[Axes], run: Run, levels: Levels) -> None:

@@ -8,7 +8,7 @@ from agents_helpers import PRETRAINED, assert_refused, small_run
 from typer.testing import CliRunner
 
 from agents.__main__ import app
-from agents.curve import Levels, by_environment, figure_of, levels_of
+from agents.curve import PRETRAINING, Levels, by_environment, figure_of, levels_of
 from agents.runs import CURVE, read_curve, read_pretraining, start_run
 from agents.train import train
 from baselines import fuel_optimal, make_policy
@@ -51,10 +51,10 @@ def test_lines_are_those_of_the_files(runs: dict[str, Path]) -> None:
     left, right = figure.axes
     assert [axes.get_yscale() for axes in (left, right)] == ["log", "log"]
     judged, *curves = read_pretraining(runs["pretrained"]), *(read_curve(folder) for folder in runs.values())
-    looks = style.looks(["lqr", "ppo", "sac"])
-    for axes, tables, names in ((left, [judged], ["ppo"]), (right, curves, ["ppo", "ppo", "sac"])):
+    colors = {name: look.color for name, look in style.looks(["lqr", "ppo", "sac"]).items()} | {"both": PRETRAINING}
+    for axes, tables, names in ((left, [judged], ["both"]), (right, curves, ["ppo", "ppo", "sac"])):
         *lines, level = axes.get_lines()
-        assert [line.get_color() for line in (*lines, level)] == [looks[name].color for name in (*names, "lqr")]
+        assert [line.get_color() for line in (*lines, level)] == [colors[name] for name in (*names, "lqr")]
         assert set(level.get_ydata()) == {1.25}
         for line, table in zip(lines, tables, strict=True):
             np.testing.assert_allclose(line.get_xdata(), table["seconds"] / 60)

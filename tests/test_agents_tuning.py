@@ -148,6 +148,10 @@ def test_all_trials_start_from_one_actor(tmp_path: Path) -> None:
     given = small_run(tmp_path, "ppo", PRETRAINED, steps=128, validations=1, start=path)
     others = [given, small_run(tmp_path, "ppo", PRETRAINED, steps=128), small_run(tmp_path, "ppo", steps=128)]
     assert len({task_name(each) for each in (run, *others)}) == 4
+    run_folder = tmp_path / "run"
+    train(run, run_folder)
+    another = small_run(tmp_path, "ppo", PRETRAINED, steps=128, validations=1, start=run_folder)
+    assert task_name(another) == task_name(given)  # what counts is the actor, wherever it is
     search(given, 1, tmp_path / "given")
     assert [entry.name for entry in sorted((tmp_path / "given").iterdir())] == [BEST, JOURNAL]
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from agents.runs import Run, read_curve
+from agents.runs import Run, read_curve, start_file
 from agents.settings import AgentSettings
 from agents.train import pretrained, train
 from agents.tuning.knobs import KNOBS, present, turned
@@ -88,7 +88,8 @@ def search(run: Run, trials: int, folder: Path, tell: Callable[[Found], Any] = l
 
 def task_name(run: Run) -> str:
     """Of a study: a hash of all that a trial's cost depends on, so that no study goes on with another task."""
-    start = hashlib.sha256(Path(run.start).read_bytes()).hexdigest() if run.start else ""
+    given = start_file(run)
+    start = hashlib.sha256(given.read_bytes()).hexdigest() if given else ""
     task = replace(run, env="-", start="", command="", versions={})
     return hashlib.sha256(repr((task, start, KNOBS[run.algorithm])).encode()).hexdigest()[:16]
 
