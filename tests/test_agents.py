@@ -15,11 +15,24 @@ from agents.__main__ import MISTAKE, app
 from agents.evaluate import Sb3Policy
 from agents.models import CLASSES
 from agents.plan import plan_run
-from agents.runs import BEST, CHECKPOINT, CURVE, MODEL, RUN, Run, load_best, load_run, save_model, start_run
+from agents.runs import (
+    BEST,
+    CHECKPOINT,
+    CURVE,
+    MODEL,
+    PRETRAINED_BY,
+    RUN,
+    Run,
+    load_best,
+    load_run,
+    save_model,
+    start_run,
+)
 from agents.settings import PPOSettings, SACSettings, load_settings
 from agents.train import train, training_seeds
 from agents.validation import validate
 from formation_env import ConfigError
+from formation_env.envs import ENV_IDS
 from formation_env.evaluation import evaluate
 from formation_env.files import replacing
 from formation_env.seeds import seeds
@@ -100,6 +113,15 @@ def test_shipped_hyperparameters_load_for_every_algorithm() -> None:
     """The shipped files are valid, and each gives its own class."""
     assert isinstance(load_settings("ppo", "keeping"), PPOSettings)
     assert isinstance(load_settings("sac", "mission"), SACSettings)
+
+
+@pytest.mark.parametrize("env", [*ENV_IDS, "bad_communication"])
+def test_both_algorithms_are_pretrained_in_the_same_way(env: str) -> None:
+    """So one pretrained actor serves both, and what they make of it can be compared."""
+    ppo, sac = load_settings("ppo", env), load_settings("sac", env)
+    assert ppo.pretraining is not None
+    for key in PRETRAINED_BY:
+        assert getattr(ppo, key) == getattr(sac, key), key
 
 
 def test_a_scenario_may_have_hyperparameters_of_its_own(tmp_path: Path) -> None:
