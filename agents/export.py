@@ -11,11 +11,11 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from agents.actor import Actor, to_bytes
+from agents.actor import Actor, read_actor, to_bytes
 from agents.graph import to_onnx
-from agents.runs import Run, load_best, read_curve, read_pretraining
+from agents.runs import START, Run, load_best, read_curve, read_pretraining
 from agents.shipped import CARD, GRAPH, TENSORS, Card, Interval, Trained, policy_name, sha256
-from formation_env.evaluation import evaluate, summarise
+from formation_env.evaluation import evaluate, paired_difference, summarise
 from formation_env.files import write_files
 from formation_env.observation import SIZE
 from formation_env.seeds import seeds
@@ -99,6 +99,7 @@ def _examine(folder: Path, run: Run, actor: Actor) -> Candidate:
         wall_time_s=float(last["seconds"]),
         validation_cost_m_s=-float(validation["return"].mean()),
         test_cost_m_s=_cost(episodes),
+        saved_m_s=_saved(folder, run, episodes),
     )
     return Candidate(run, actor, trained, episodes)
 
@@ -109,6 +110,15 @@ def _pretraining_s(folder: Path, run: Run) -> float | None:
     if judged is not None:
         return float(judged["seconds"].max())
     return None if run.agent.pretraining or run.start else 0.0
+
+
+def _saved(folder: Path, run: Run, episodes: pd.DataFrame) -> Interval | None:
+    """What was learnt after the start, of which there need not be one."""
+    if not (folder / START).exists():
+        return None
+    start = evaluate(read_actor(folder / START, run.scenario), run.scenario, seeds("test", TEST_EPISODES))
+    mean, low, high = paired_difference(episodes, start)
+    return Interval(mean=mean, low=low, high=high)
 
 
 def _cost(episodes: pd.DataFrame) -> Interval:

@@ -46,6 +46,8 @@ class Trained:
         wall_time_s: of the training from there on, s.
         validation_cost_m_s: mean cost on the validation seeds, by which the shipped run was chosen, m/s.
         test_cost_m_s: cost on the test seeds, m/s; nothing was chosen by it.
+        saved_m_s: by how much less that is than the cost of the actor that the run started from, paired by seed, m/s;
+            none where it started from random weights.
     """
 
     seed: int
@@ -54,6 +56,7 @@ class Trained:
     wall_time_s: Real
     validation_cost_m_s: Real
     test_cost_m_s: Interval
+    saved_m_s: Interval | None
 
 
 @settings

@@ -15,7 +15,7 @@ from agents.__main__ import MISTAKE, app
 from agents.actor import Functions, read_actor
 from agents.export import export
 from agents.graph import to_onnx
-from agents.runs import START, load_best, read_pretraining
+from agents.runs import BEST, START, load_best, read_pretraining
 from agents.shipped import CARD, GRAPH, TENSORS, load_with_card, read_card, shipped_paths
 from agents.train import train
 from formation_env import ConfigError, FormationVectorEnv, load_scenario
@@ -138,6 +138,23 @@ def test_the_card_has_the_time_of_pretraining(tmp_path: Path) -> None:
     found = {run.seed: run.pretraining_s for run in read_card(path.with_suffix(CARD)).runs}
     assert found == {1: pytest.approx(judged["seconds"].iloc[-1]), 2: None, 3: 0.0}
     assert judged["seconds"].iloc[-1] > 0
+
+
+def test_the_card_has_what_was_learnt_after_the_start(tmp_path: Path) -> None:
+    """Cost of the start less cost of the best policy, both flown here; none where there was no actor to start from."""
+    small = {"steps": 256, "validations": 2}
+    train(run := small_run(tmp_path, "ppo", PRETRAINED, seed=1, **small), tmp_path / "pretrained")
+    train(small_run(tmp_path, "ppo", seed=3, **small), tmp_path / "new")
+    path = export([tmp_path / "pretrained", tmp_path / "new"], tmp_path / "out")
+    saved = {trained.seed: trained.saved_m_s for trained in read_card(path.with_suffix(CARD)).runs}
+    flown = [
+        evaluate(read_actor(tmp_path / "pretrained" / name, run.scenario), run.scenario, seeds("test", 100))["return"]
+        for name in (BEST, START)
+    ]
+    assert saved[3] is None
+    assert saved[1] is not None
+    assert saved[1].mean == pytest.approx((flown[0] - flown[1]).mean(), rel=1e-6)
+    assert saved[1].low <= saved[1].mean <= saved[1].high
 
 
 @pytest.mark.parametrize("activation", ["tanh", "relu", "elu"])
