@@ -183,6 +183,19 @@ class SACSettings(CommonSettings):
     target_entropy: Real = -6.0
     actor_delay_steps: Whole = 0
     reward_scale: Positive = 10.0
+    after_state: Flag = False
+    critic: Network = Network(hidden=(256, 256), activation="relu")
+    critics: Count = 2
+    mean_target: Flag = False
+    n_steps: Count = 1
+    learning_rate_end: NonNegative = 1e-4
+    actor_learning_rate: Positive = 1e-5
+    actor_every: Count = 1
+    actor_batch: Count = 256
+    anchor_weight: NonNegative = 0.0
+    noise_low: NonNegative = 0.0
+    noise_high: NonNegative = 0.0
+    noise_share: Probability = 1.0
     network: Network = Network(activation="relu")
 
 

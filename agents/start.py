@@ -9,7 +9,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 
 from agents.actor import Actor, read_actor
 from agents.convert import actor_of
-from agents.models import CriticFirstSAC
+from agents.sac import CriticFirstSAC
 from agents.settings import AgentSettings
 from formation_env.scenario import Scenario
 from formation_env.settings import ConfigError
