@@ -3,22 +3,19 @@
 import math
 from typing import Any, Final
 
-import numpy as np
 import torch
 from gymnasium import spaces
-from numpy.typing import NDArray
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.noise import ActionNoise
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.type_aliases import Schedule
-from stable_baselines3.common.utils import LinearSchedule, update_learning_rate
+from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from torch import nn
 
+from agents.afterstate import AfterStatePolicy, Known
 from agents.features import CUT, MAGNIFIED
-from agents.afterstate import AfterStatePolicy
 from agents.sac import CriticFirstSAC
 from agents.settings import AgentSettings, PPOSettings, SACSettings
 from agents.shaping import Shaping
@@ -122,15 +119,11 @@ def _ppo(agent: PPOSettings, env: VecEnv, seed: int) -> PPO:
 def _sac(agent: SACSettings, env: VecEnv, seed: int) -> SAC:
     # SB3 cuts the mean of gSDE off at 2, which would be another actor than the one in the file.
     own: dict[str, Any] = {"log_std_init": agent.log_std_init, "clip_mean": 0.0}
+    own["net_arch"] = {"pi": list(agent.network.hidden), "qf": list(agent.critic_hidden)}
     if agent.after_state:
         scenario = env.unwrapped.batch.scenario
-        own["after"] = {
-            "scenario": scenario, "magnification": agent.magnification, "throttle_power": agent.throttle_power,
-            "thrust_price": agent.reward_scale * scenario.spacecraft.max_accel_m_s2 * scenario.dt_s,
-            "hidden": list(agent.critic.hidden), "activation": ACTIVATIONS[agent.critic.activation], "n_critics": agent.critics,
-        }
-    layers = _layers(agent)
-    layers["net_arch"] = {"pi": list(agent.network.hidden), "qf": list(agent.critic.hidden)}
+        price = agent.reward_scale * scenario.spacecraft.max_accel_m_s2 * scenario.dt_s
+        own["known"] = Known(scenario, agent.throttle_power, price)
     model = CriticFirstSAC(
         AfterStatePolicy if agent.after_state else "MlpPolicy",
         env,
@@ -147,22 +140,14 @@ def _sac(agent: SACSettings, env: VecEnv, seed: int) -> SAC:
         target_entropy=agent.target_entropy,
         use_sde=agent.use_sde,
         sde_sample_freq=agent.sde_sample_freq,
-        policy_kwargs=layers | own,
+        policy_kwargs=_layers(agent) | own,
         seed=seed,
         device="cpu",
     )
     if not agent.use_sde:  # else SB3 does it
         nn.init.zeros_(model.actor.log_std.weight)
         nn.init.constant_(model.actor.log_std.bias, agent.log_std_init)
-    model.actor_delay_steps = agent.actor_delay_steps
-    model.actor_learning_rate = agent.actor_learning_rate
-    model.actor_every = agent.actor_every
-    model.actor_batch = agent.actor_batch
-    model.anchor_weight = agent.anchor_weight
-    model.noise_share = agent.noise_share
-    model.mean_target = agent.mean_target
-    if agent.noise_high:
-        model.noise_scales = np.geomspace(agent.noise_low, agent.noise_high, agent.rows)
+    model.how = agent
     return model
 
 

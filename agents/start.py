@@ -36,7 +36,7 @@ def start_from(path: Path, model: BaseAlgorithm, agent: AgentSettings, scenario:
             target.weight.copy_(torch.from_numpy(source[0]))
             target.bias.copy_(torch.from_numpy(source[1]))
     if isinstance(model, CriticFirstSAC):
-        model.random_start = False
+        model.keep_near()
 
 
 def _shape(actor: Actor) -> dict[str, Any]:
