@@ -5,18 +5,18 @@ from typing import Any, Final
 
 import torch
 from gymnasium import spaces
-from numpy.typing import NDArray
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.base_class import BaseAlgorithm
-from stable_baselines3.common.noise import ActionNoise
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.type_aliases import Schedule
-from stable_baselines3.common.utils import LinearSchedule, update_learning_rate
+from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from torch import nn
 
+from agents.afterstate import AfterStatePolicy, Known
 from agents.features import CUT, MAGNIFIED
+from agents.sac import CriticFirstSAC
 from agents.settings import AgentSettings, PPOSettings, SACSettings
 from agents.shaping import Shaping
 from agents.vec_env import Sb3VecEnv
@@ -70,29 +70,6 @@ class CriticFirstPPO(PPO):
             policy.log_std.clamp_(min=self.log_std_min)
 
 
-class CriticFirstSAC(SAC):
-    """SAC whose first updates are the critics' alone, and which need not begin with random flights.
-
-    Attributes:
-        actor_delay_steps: up to this step actor and temperature stay as they are.
-        random_start: whether the steps before the first update are flown at random, and not by the actor.
-    """
-
-    actor_delay_steps: int = 0
-    random_start: bool = True
-
-    def _update_learning_rate(self, optimizers: list[torch.optim.Optimizer] | torch.optim.Optimizer) -> None:
-        super()._update_learning_rate(optimizers)
-        if self.num_timesteps <= self.actor_delay_steps:
-            for optimizer in (self.actor.optimizer, self.ent_coef_optimizer):
-                update_learning_rate(optimizer, 0.0)
-
-    def _sample_action(
-        self, learning_starts: int, action_noise: ActionNoise | None = None, n_envs: int = 1
-    ) -> tuple[NDArray[Any], NDArray[Any]]:
-        return super()._sample_action(learning_starts if self.random_start else 0, action_noise, n_envs)
-
-
 def make_env(agent: AgentSettings, scenario: Scenario) -> VecEnv:
     """The environment to learn on."""
     shaping = Shaping(scenario, agent.shaping_weight, agent.gamma) if agent.shaping_weight else None
@@ -103,7 +80,7 @@ def make_env(agent: AgentSettings, scenario: Scenario) -> VecEnv:
         throttle_power=agent.throttle_power,
         shaping=shaping,
         bootstrap_end=agent.bootstrap_end,
-        stagger=True,
+        stagger=isinstance(agent, PPOSettings),  # a replay buffer mixes the parts of a mission anyway
     )
     return VecNormalize(env, norm_obs=False, gamma=agent.gamma) if agent.normalise_reward else env
 
@@ -141,18 +118,24 @@ def _ppo(agent: PPOSettings, env: VecEnv, seed: int) -> PPO:
 
 def _sac(agent: SACSettings, env: VecEnv, seed: int) -> SAC:
     # SB3 cuts the mean of gSDE off at 2, which would be another actor than the one in the file.
-    own = {"log_std_init": agent.log_std_init, "clip_mean": 0.0}
+    own: dict[str, Any] = {"log_std_init": agent.log_std_init, "clip_mean": 0.0}
+    own["net_arch"] = {"pi": list(agent.network.hidden), "qf": list(agent.critic_hidden)}
+    if agent.after_state:
+        scenario = env.unwrapped.batch.scenario
+        price = agent.reward_scale * scenario.spacecraft.max_accel_m_s2 * scenario.dt_s
+        own["known"] = Known(scenario, agent.throttle_power, price)
     model = CriticFirstSAC(
-        "MlpPolicy",
+        AfterStatePolicy if agent.after_state else "MlpPolicy",
         env,
         train_freq=1,
         gradient_steps=agent.gradient_steps,
         batch_size=agent.batch_size,
         buffer_size=agent.buffer_size,
         learning_starts=agent.learning_starts,
-        learning_rate=agent.learning_rate,
+        learning_rate=LinearSchedule(agent.learning_rate, agent.learning_rate_end, 1.0),
         gamma=agent.gamma,
         tau=agent.tau,
+        n_steps=agent.n_steps,
         ent_coef=f"auto_{agent.entropy_init}",
         target_entropy=agent.target_entropy,
         use_sde=agent.use_sde,
@@ -164,7 +147,7 @@ def _sac(agent: SACSettings, env: VecEnv, seed: int) -> SAC:
     if not agent.use_sde:  # else SB3 does it
         nn.init.zeros_(model.actor.log_std.weight)
         nn.init.constant_(model.actor.log_std.bias, agent.log_std_init)
-    model.actor_delay_steps = agent.actor_delay_steps
+    model.how = agent
     return model
 
 

@@ -156,19 +156,44 @@ class PPOSettings(CommonSettings):
 
 
 @settings
-class SACSettings(CommonSettings):
-    """Soft actor-critic (Haarnoja et al. 2018), with its temperature learnt.
+class Kicks:
+    """Strong thrusts at random, seldom enough for the returns between them to be those of the actor.
 
     Attributes:
-        gradient_steps: updates after each step of all rows.
-        batch_size: samples of an update.
+        share: of the steps that are kicked.
+        low: standard deviation of what is added to the throttles in the first row.
+        high: in the last; those of the rows between are a geometric series.
+    """
+
+    share: Share = 0.03
+    low: Positive = 0.02
+    high: Positive = 0.3
+
+
+@settings
+class SACSettings(CommonSettings):
+    """Soft actor-critic (Haarnoja et al. 2018), with its temperature learnt; see `agents.sac`.
+
+    Attributes:
+        gradient_steps: updates of the critics after each step of all rows.
+        batch_size: samples of each.
         buffer_size: transitions remembered; those there are stand in the checkpoint, too, at 330 bytes each.
         learning_starts: steps flown before the first update: at random, or by the actor that the run starts from.
-        learning_rate: of actor, critics and temperature.
+        learning_rate: of the critics, at the start; it falls linearly to learning_rate_end at the last step.
+        learning_rate_end: at the end.
         tau: share by which the target critics follow in each update.
+        n_steps: rewards that are summed up before the critics are asked for the rest.
+        after_state: whether critics know what a thrust costs and where it leads, see `agents.afterstate`.
+        critic_hidden: width of each hidden layer of the critics.
         entropy_init: first temperature.
         target_entropy: entropy of the throttles that the temperature aims at, in nats; low, since noise costs fuel.
         actor_delay_steps: up to this step the critics alone learn.
+        actor_learning_rate: of actor and temperature, at first; it falls linearly to nothing.
+        actor_every: updates of the critics for each of the actor.
+        actor_batch_size: samples of that.
+        anchor_weight: price, in scaled rewards, of the squared distance of throttles from those of the actor that the
+            run starts from.
+        kicks: added to the throttles that are flown; none if it is left out.
     """
 
     steps: Count = 200_000
@@ -177,13 +202,31 @@ class SACSettings(CommonSettings):
     buffer_size: Count = 300_000
     learning_starts: Count = 3_200
     learning_rate: Positive = 1e-3
+    learning_rate_end: NonNegative = 1e-3
     gamma: Probability = 0.98
     tau: Share = 0.02
+    n_steps: Count = 1
+    after_state: Flag = False
+    critic_hidden: Annotated[tuple[Count, ...], Field(min_length=1)] = (64, 64)
     entropy_init: Positive = 0.01
     target_entropy: Real = -6.0
     actor_delay_steps: Whole = 0
+    actor_learning_rate: Positive = 1e-3
+    actor_every: Count = 1
+    actor_batch_size: Count = 256
+    anchor_weight: NonNegative = 0.0
+    kicks: Kicks | None = None
     reward_scale: Positive = 10.0
     network: Network = Network(activation="relu")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        """Refuse what does not go together."""
+        if self.after_state and self.normalise_reward:
+            raise ValueError("normalise_reward: must be false with after_state, which knows what thrust costs")
+        if self.kicks is not None and self.kicks.low > self.kicks.high:
+            raise ValueError(f"kicks.low: must be at most kicks.high = {self.kicks.high}, got {self.kicks.low}")
+        return self
 
 
 AgentSettings = PPOSettings | SACSettings

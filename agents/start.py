@@ -9,7 +9,7 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 
 from agents.actor import Actor, read_actor
 from agents.convert import actor_of
-from agents.models import CriticFirstSAC
+from agents.sac import CriticFirstSAC
 from agents.settings import AgentSettings
 from formation_env.scenario import Scenario
 from formation_env.settings import ConfigError
@@ -36,7 +36,7 @@ def start_from(path: Path, model: BaseAlgorithm, agent: AgentSettings, scenario:
             target.weight.copy_(torch.from_numpy(source[0]))
             target.bias.copy_(torch.from_numpy(source[1]))
     if isinstance(model, CriticFirstSAC):
-        model.random_start = False
+        model.keep_near()
 
 
 def _shape(actor: Actor) -> dict[str, Any]:

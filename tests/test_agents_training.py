@@ -60,7 +60,8 @@ ALL_OPTIONS = "use_sde: true\nsde_sample_freq: 5\nnormalise_reward: true\nshapin
         ("ppo", ""),
         ("ppo", ALL_OPTIONS + "bootstrap_end: true\nwarmup_rollouts: 3\n"),
         ("sac", ""),
-        ("sac", ALL_OPTIONS + "actor_delay_steps: 200\n"),
+        ("sac", ALL_OPTIONS + "actor_delay_steps: 200\nactor_every: 3\n"),
+        ("sac", "after_state: true\nn_steps: 4\nkicks: {share: 0.2}\nlearning_rate_end: 1e-4\n"),
     ],
 )
 def test_killed_and_resumed_is_uninterrupted(

@@ -20,7 +20,7 @@ KNOBS: Final[dict[Algorithm, tuple[Knob, ...]]] = {
     "sac": (
         Knob(("learning_rate",), 3e-6, 1e-3),
         Knob(("tau",), 1e-3, 0.05),
-        Knob(("gamma",), 0.9, 0.999, log=False),
+        Knob(("gamma",), 0.9, 1, log=False),
         Knob(("entropy_init",), 1e-6, 1e-2),
         Knob(("target_entropy",), -20, 0, log=False),
         _EXPLORATION,
