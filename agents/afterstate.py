@@ -20,14 +20,13 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor, create_
 from stable_baselines3.sac.policies import SACPolicy
 from torch import Tensor, nn
 
-from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, Array
+from agents.features import REST
+from formation_env.dynamics.base import Array
 from formation_env.observation import SIZE, SLICES
 from formation_env.scenario import Scenario
-from formation_env.schedule import FIELDS, OFFSETS, build_schedule, legs, observation_layout
+from formation_env.schedule import build_schedule, coast_matrices, columns, legs, observation_layout
 
 ERROR: Final = SLICES["error"]
-REST: Final = slice(SLICES["reference"].start, SIZE)
-"""What of an observation does not depend on the state."""
 SHOWN: Final = 12 + REST.stop - REST.start
 """How many features `Foresight` gives."""
 UNIT_POS_M: Final = 20.0
@@ -81,9 +80,7 @@ class Foresight(nn.Module):
 def _maps(scenario: Scenario) -> Array:
     """For each step the matrix (T, 12, 10) from error, thrust and 1 to error and arrival error after it; m, m/s."""
     table, model = build_schedule(scenario), scenario.filter_model().steps(0, scenario.num_steps)
-    r, A = _columns(table, "reference"), np.zeros((len(table), 6, 6))
-    for name, axes in (("coast_in_plane", IN_PLANE), ("coast_cross_track", CROSS_TRACK)):
-        A[:, axes[:, None], axes] = _columns(table, name).reshape(-1, len(axes), len(axes))
+    r, A = columns(table, "reference"), coast_matrices(table)
     maps = np.zeros((scenario.num_steps, 12, 10))
     # x' - r' = Phi e + Gamma u + (Phi r + delta - r')
     maps[:, :6, :6] = model.Phi
@@ -91,12 +88,8 @@ def _maps(scenario: Scenario) -> Array:
     maps[:, :6, 9] = np.einsum("kij,kj->ki", model.Phi, r[:-1]) + model.delta - r[1:]
     # A' x' + b' = A' (x' - r') + (A' r' + b')
     maps[:, 6:] = A[1:] @ maps[:, :6]
-    maps[:, 6:, 9] += np.einsum("kij,kj->ki", A[1:], r[1:]) + _columns(table, "coast_offset")[1:]
+    maps[:, 6:, 9] += np.einsum("kij,kj->ki", A[1:], r[1:]) + columns(table, "coast_offset")[1:]
     return maps
-
-
-def _columns(table: Array, name: str) -> Array:
-    return table[:, OFFSETS[name] : OFFSETS[name] + FIELDS[name]]
 
 
 @dataclass(frozen=True)

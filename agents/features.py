@@ -10,10 +10,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_env.observation import SLICES
+from formation_env.observation import SIZE, SLICES
 
 MAGNIFIED: Final = slice(SLICES["error"].start, SLICES["arrival_error"].stop)
 """The blocks `error` and `arrival_error`, which stand side by side."""
+REST: Final = slice(SLICES["reference"].start, SIZE)
+"""What of an observation does not depend on the state: plan, clock and filter."""
 CUT: Final = 5.0
 """No feature is beyond this."""
 

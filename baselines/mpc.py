@@ -15,7 +15,7 @@ from baselines.policy import AccelerationPolicy, Observations
 from baselines.timeline import read_instants
 from formation_env.dynamics.base import Array, DiscreteModel
 from formation_env.scenario import Scenario
-from formation_env.schedule import OFFSETS, build_schedule, legs, observation_layout
+from formation_env.schedule import build_schedule, column, columns, legs, observation_layout
 from formation_env.settings import NonNegative, Positive, settings
 
 _UNIT_M = 100.0
@@ -62,8 +62,8 @@ class MPC(AccelerationPolicy):
         self._legs, self._layout = legs(scenario), observation_layout(scenario)
         self._model, self._spans = scenario.filter_model(), dict[tuple[int, int], DiscreteModel]()
         table = build_schedule(scenario)
-        self._place = table[:, OFFSETS["scored_position"] :][:, :3]
-        self._price = gains.price_scale * table[:, OFFSETS["error_price"]]
+        self._place = columns(table, "scored_position")
+        self._price = gains.price_scale * column(table, "error_price")
         self._price[[leg.arrival for leg in self._legs if leg.arrival > leg.start]] += gains.arrival_price
         # the phase that judges each instant: a phase's beginning belongs to the one before
         self._judge = np.searchsorted([leg.end for leg in self._legs], np.arange(scenario.num_steps + 1))

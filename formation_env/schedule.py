@@ -89,21 +89,31 @@ def build_schedule(scenario: Scenario) -> Array:
         _fill_plan(table, scenario, leg)
         _fill_scores(table, scenario, leg)
     arrivals = [leg.arrival for leg in legs(scenario) if leg.arrival > leg.start] or [0]
-    _column(table, "arrives")[arrivals] = 1 / len(arrivals)
+    column(table, "arrives")[arrivals] = 1 / len(arrivals)
     times_s: Array = scenario.dt_s * np.arange(len(table), dtype=float)
-    _column(table, "link_closed")[:] = scenario.dropout.closed(times_s)
+    column(table, "link_closed")[:] = scenario.dropout.closed(times_s)
     for name, left in (("error_price", "price_left"), ("counts", "counts_left"), ("arrives", "arrives_left")):
-        column = _column(table, name)
-        _column(table, left)[:] = np.cumsum(column[::-1])[::-1] - column
+        added = column(table, name)
+        column(table, left)[:] = np.cumsum(added[::-1])[::-1] - added
     return table
 
 
-def _column(table: Array, name: str) -> Array:
+def column(table: Array, name: str) -> Array:
+    """A field of one number, of all instants (num_steps + 1,); a view of the table."""
     return table[:, OFFSETS[name]]
 
 
-def _columns(table: Array, name: str) -> Array:
+def columns(table: Array, name: str) -> Array:
+    """A field of several numbers, of all instants (num_steps + 1, FIELDS[name]); a view of the table."""
     return table[:, OFFSETS[name] : OFFSETS[name] + FIELDS[name]]
+
+
+def coast_matrices(table: Array) -> Array:
+    """Transition matrices (num_steps + 1, 6, 6) from each instant to the arrival, by the filter's model."""
+    A = np.zeros((len(table), 6, 6))
+    for name, axes in (("coast_in_plane", IN_PLANE), ("coast_cross_track", CROSS_TRACK)):
+        A[:, axes[:, None], axes] = columns(table, name).reshape(-1, len(axes), len(axes))
+    return A
 
 
 def _fill_plan(table: Array, scenario: Scenario, leg: Leg) -> None:
@@ -114,15 +124,15 @@ def _fill_plan(table: Array, scenario: Scenario, leg: Leg) -> None:
     coast_steps = np.maximum(leg.arrival - steps, 0)
     Phi, delta = _coasts(scenario.filter_model().steps(leg.start, leg.arrival))
     goal = leg_reference(scenario, leg, np.maximum(steps, leg.arrival))
-    _columns(table, "reference")[in_force] = reference
-    _columns(table, "coast_in_plane")[in_force] = Phi[np.ix_(coast_steps, IN_PLANE, IN_PLANE)].reshape(-1, 16)
-    _columns(table, "coast_cross_track")[in_force] = Phi[np.ix_(coast_steps, CROSS_TRACK, CROSS_TRACK)].reshape(-1, 4)
-    _columns(table, "coast_offset")[in_force] = delta[coast_steps] - goal
+    columns(table, "reference")[in_force] = reference
+    columns(table, "coast_in_plane")[in_force] = Phi[np.ix_(coast_steps, IN_PLANE, IN_PLANE)].reshape(-1, 16)
+    columns(table, "coast_cross_track")[in_force] = Phi[np.ix_(coast_steps, CROSS_TRACK, CROSS_TRACK)].reshape(-1, 4)
+    columns(table, "coast_offset")[in_force] = delta[coast_steps] - goal
     period_s = scenario.orbit.period_s
-    _column(table, "time_to_arrival")[in_force] = coast_steps * scenario.dt_s / period_s
-    _column(table, "in_hold")[in_force] = steps >= leg.arrival
-    _column(table, "phase")[in_force] = leg.index
-    _column(table, "time_left")[in_force] = (leg.end - steps) * scenario.dt_s / period_s
+    column(table, "time_to_arrival")[in_force] = coast_steps * scenario.dt_s / period_s
+    column(table, "in_hold")[in_force] = steps >= leg.arrival
+    column(table, "phase")[in_force] = leg.index
+    column(table, "time_left")[in_force] = (leg.end - steps) * scenario.dt_s / period_s
 
 
 def _coasts(model: DiscreteModel) -> tuple[Array, Array]:
@@ -151,6 +161,6 @@ def _fill_scores(table: Array, scenario: Scenario, leg: Leg) -> None:
         ends, judged = np.arange(leg.end + 1), slice(0, leg.end + 1)
     held = ends > leg.arrival
     weight = np.where(held, scenario.reward.error_weight, scenario.reward.transfer_error_weight)
-    _columns(table, "scored_position")[judged] = leg_reference(scenario, leg, ends)[:, :3]
-    _column(table, "error_price")[judged] = np.where(ends > 0, weight, 0) * scenario.dt_s / scenario.hold_s
-    _column(table, "counts")[judged] = held
+    columns(table, "scored_position")[judged] = leg_reference(scenario, leg, ends)[:, :3]
+    column(table, "error_price")[judged] = np.where(ends > 0, weight, 0) * scenario.dt_s / scenario.hold_s
+    column(table, "counts")[judged] = held

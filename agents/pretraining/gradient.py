@@ -14,9 +14,8 @@ from torch import Tensor, nn
 
 from agents.features import CUT
 from agents.pretraining.recording import Recording
-from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, Array
 from formation_env.observation import LOG_RANGE, LOG_UNIT_POS_M, LOG_UNIT_VEL_M_S
-from formation_env.schedule import FIELDS, OFFSETS, build_schedule, observation_layout
+from formation_env.schedule import build_schedule, coast_matrices, column, columns, observation_layout
 
 SMOOTH_M: Final = 1e-2
 """Errors below this are not told from zero; the root has no gradient there."""
@@ -49,13 +48,13 @@ class ModelEpisodes:
         self._pushes = _tensor(recording.pushes + delta[:, None])
         # both errors, (x_hat - r, A x_hat + b), in units of the logarithms
         unit = np.tile(np.repeat([LOG_UNIT_POS_M, LOG_UNIT_VEL_M_S], 3), 2)
-        A, b, r = _coasts(table), _columns(table, "coast_offset"), _columns(table, "reference")
+        A, b, r = coast_matrices(table), columns(table, "coast_offset"), columns(table, "reference")
         matrices = np.concatenate([np.broadcast_to(np.eye(6), A.shape), A], axis=1) / unit[:, None]
         self._both, self._offset = _tensor(matrices.swapaxes(1, 2)), _tensor(np.concatenate([-r, b], axis=1) / unit)
         self._linear = _tensor(magnification * unit / np.tile(observation_layout(scenario).state_scale, 2))
         self._price, self._scored = (
-            _tensor(table[:, OFFSETS["error_price"]]),
-            _tensor(_columns(table, "scored_position")),
+            _tensor(column(table, "error_price")),
+            _tensor(columns(table, "scored_position")),
         )
         self._starts, self._errors = _tensor(recording.starts), _tensor(recording.estimate_errors)
         self._rest = _tensor(recording.rest)
@@ -99,18 +98,6 @@ class ModelEpisodes:
 def _norm(vectors: Tensor, smooth: float) -> Tensor:
     """|v| of (..., n), with a gradient at zero, too."""
     return torch.sqrt((vectors**2).sum(dim=-1) + smooth**2) - smooth
-
-
-def _coasts(table: Array) -> Array:
-    """Transition matrices (T + 1, 6, 6) to the arrival out of the plan's table."""
-    A = np.zeros((len(table), 6, 6))
-    for name, axes in (("coast_in_plane", IN_PLANE), ("coast_cross_track", CROSS_TRACK)):
-        A[:, axes[:, None], axes] = _columns(table, name).reshape(-1, len(axes), len(axes))
-    return A
-
-
-def _columns(table: Array, name: str) -> Array:
-    return table[:, OFFSETS[name] : OFFSETS[name] + FIELDS[name]]
 
 
 def _tensor(array: Any) -> Tensor:

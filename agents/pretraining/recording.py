@@ -10,15 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.features import REST
 from formation_env.dynamics import NONLINEAR
 from formation_env.dynamics.base import Array
 from formation_env.envs import FormationVectorEnv
-from formation_env.observation import SIZE, SLICES
+from formation_env.observation import SIZE
 from formation_env.scenario import Scenario
 from formation_env.settings import ConfigError
-
-REST = slice(SLICES["reference"].start, SIZE)
-"""What of an observation does not depend on the state."""
 
 
 @dataclass(frozen=True)

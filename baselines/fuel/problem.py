@@ -15,7 +15,7 @@ from formation_env.dynamics.base import Array
 from formation_env.envs import FormationEnv
 from formation_env.envs.interface import INFO_THRUST
 from formation_env.scenario import Limits, Scenario
-from formation_env.schedule import FIELDS, OFFSETS, Leg, build_schedule, leg_reference, legs
+from formation_env.schedule import Leg, build_schedule, column, columns, leg_reference, legs
 
 _FAR_M: Final = 1e9
 """A distance limit that no episode reaches."""
@@ -136,10 +136,10 @@ def _fly(env: FormationEnv, seed: int, action: float) -> tuple[Array, Array]:
 
 def _scores(scenario: Scenario) -> tuple[Array, Array]:
     """What each instant is judged by: a state (steps + 1, 6), of which only the position counts, and the price."""
-    schedule, first = build_schedule(scenario), OFFSETS["scored_position"]
-    goal = np.zeros((len(schedule), 6))
-    goal[:, :3] = schedule[:, first : first + FIELDS["scored_position"]]
-    return goal, schedule[:, OFFSETS["error_price"]].copy()
+    table = build_schedule(scenario)
+    goal = np.zeros((len(table), 6))
+    goal[:, :3] = columns(table, "scored_position")
+    return goal, column(table, "error_price").copy()
 
 
 def _meet(scenario: Scenario, goal: Array) -> tuple[int, ...]:

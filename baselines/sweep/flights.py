@@ -16,7 +16,7 @@ from formation_env.dynamics import NONLINEAR
 from formation_env.dynamics.base import Array
 from formation_env.evaluation import Policy, bootstrap_interval, evaluate
 from formation_env.scenario import Scenario
-from formation_env.schedule import FIELDS, OFFSETS, build_schedule
+from formation_env.schedule import build_schedule, column, columns
 from formation_env.settings import ConfigError
 
 BOUND: Final = "bound"
@@ -110,9 +110,8 @@ def mean_hold_error_m(scenario: Scenario, states: Array) -> float:
         scenario: what is flown.
         states: LVLH states (steps + 1, 6), m and m/s.
     """
-    schedule, first = build_schedule(scenario), OFFSETS["scored_position"]
-    goal, counts = schedule[:, first : first + FIELDS["scored_position"]], schedule[:, OFFSETS["counts"]]
-    error_m = np.linalg.norm(states[:, :3] - goal, axis=1)
+    table = build_schedule(scenario)
+    error_m, counts = np.linalg.norm(states[:, :3] - columns(table, "scored_position"), axis=1), column(table, "counts")
     return float(counts @ error_m / counts.sum())
 
 
