@@ -40,7 +40,7 @@ class Sums:
     final_error_m: Array
     tolerated: Array
     lost: Array
-    hold_steps: float
+    hold_steps: Array
 
 
 def _return(sums: Sums) -> Array:
@@ -129,6 +129,6 @@ def episode_metrics(simulation: Simulation, rows: Rows = slice(None)) -> dict[st
         final_error_m=simulation.result(f.POSITION_ERROR, rows).copy(),
         tolerated=total(f.TOLERATED),
         lost=total(f.LOST),
-        hold_steps=simulation.scenario.hold_s / simulation.scenario.dt_s,
+        hold_steps=np.array([flown.hold_s / flown.dt_s for flown in simulation.variants])[simulation.variant(rows)],
     )
     return {name: metric(sums) for name, metric in METRICS.items()}
