@@ -182,6 +182,22 @@ def test_rows_and_episodes_draw_all_variants_alike() -> None:
     assert again == pytest.approx(1 / VARIANTS, abs=4 * np.sqrt(1 / VARIANTS / 2000))
 
 
+def test_the_draw_is_independent_of_the_episodes_noises() -> None:
+    """It takes numbers of its own: neither the start's errors nor their sizes follow the variant.
+
+    By chance ranks of 4000 rows correlate by 1 / sqrt(4000) = 0.016, 1 sigma; shared numbers would by about 1.
+    """
+    scenario = short()
+    env = FormationVectorEnv(4000, scenario)
+    info = env.reset(seed=7)[1]
+    nominal = np.array([variant.start.formation.state(variant.orbit) for variant in scenario.variants()])
+    errors = info["true_state"] - nominal[info["variant"]]
+    errors /= np.array([variant.start.spread_pos_m for variant in scenario.variants()])[info["variant"], None]
+    columns = np.column_stack([info["variant"], errors, np.abs(errors), info["measured"]])
+    correlation = stats.spearmanr(columns).statistic[0, 1:]
+    assert np.abs(correlation).max() < 5 / np.sqrt(4000)
+
+
 def test_the_seed_of_the_ranges_makes_other_variants() -> None:
     """Equal settings give equal variants, in every process; another seed gives others."""
     scenario = short()
