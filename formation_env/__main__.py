@@ -49,7 +49,8 @@ def check(paths: list[Path]) -> None:
             typer.echo(error, err=True)
             faults += 1
         else:
-            typer.echo(f"{path}: {scenario.num_steps} steps of {scenario.dt_s:g} s")
+            drawn = f", {len(scenario.variants())} variants" if scenario.domain_randomization else ""
+            typer.echo(f"{path}: {scenario.num_steps} steps of {scenario.dt_s:g} s{drawn}")
     raise typer.Exit(faults > 0)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any, Final, TypeVar, cast
 
 import numba
-from numba.extending import register_jitable
+from numba.extending import intrinsic, register_jitable
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -44,3 +44,27 @@ def shared(function: F) -> F:
 def loop(function: F) -> F:
     """Compile a loop over arrays that Python calls; kept on disk."""
     return cast(F, numba.njit(**_ARITHMETIC, cache=True)(function))
+
+
+def _spaced(typing_context: Any, values: Any, first: Any, step: Any, count: Any) -> Any:
+    """The type of `spaced`, and how its code is generated."""
+    if not isinstance(count, numba.types.IntegerLiteral):
+        raise numba.errors.RequireLiteralValue("spaced: count must be a constant")
+    size = count.literal_value
+    result = numba.types.UniTuple(values.dtype, size)  # type: ignore[no-untyped-call]
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array = context.make_array(signature.args[0])(context, builder, arguments[0])
+        places = [builder.add(arguments[1], builder.mul(arguments[2], arguments[2].type(k))) for k in range(size)]
+        loads = [context.unpack_value(builder, values.dtype, builder.gep(array.data, [place])) for place in places]
+        return context.make_tuple(builder, result, loads)
+
+    return result(values, numba.types.intp, numba.types.intp, count), generate
+
+
+spaced: Any = intrinsic(_spaced)
+"""spaced(array, first, step, count): numbers of a contiguous array (n,) as a tuple; how many is a constant.
+
+Each is a load of its own, which the compiler drops if nobody needs it, and turns into vector loads if a loop over rows
+is around it; with slices it does neither.
+"""

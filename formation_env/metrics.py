@@ -10,6 +10,7 @@ from formation_env.dynamics.base import Array
 from formation_env.jit import LANES
 from formation_env.kernel import tile as f
 from formation_env.kernel.simulation import Rows, Simulation
+from formation_env.schedule import OFFSETS
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Sums:
     final_error_m: Array
     tolerated: Array
     lost: Array
-    hold_steps: float
+    hold_steps: Array
 
 
 def _return(sums: Sums) -> Array:
@@ -129,6 +130,6 @@ def episode_metrics(simulation: Simulation, rows: Rows = slice(None)) -> dict[st
         final_error_m=simulation.result(f.POSITION_ERROR, rows).copy(),
         tolerated=total(f.TOLERATED),
         lost=total(f.LOST),
-        hold_steps=simulation.scenario.hold_s / simulation.scenario.dt_s,
+        hold_steps=simulation.schedule[simulation.variant(rows), 0, OFFSETS["counts_left"]],
     )
     return {name: metric(sums) for name, metric in METRICS.items()}

@@ -17,6 +17,7 @@ from formation_env.estimation import Belief, KalmanFilter, Sensor
 from formation_env.formations import AnyFormation, AtLeader
 from formation_env.orbit import Orbit
 from formation_env.perturbations import Perturbations
+from formation_env.randomization import DomainRandomization, draw_variants
 from formation_env.settings import ConfigError, NonNegative, Positive, Text, build, load_yaml, nearest, settings
 from formation_env.spacecraft import Spacecraft
 
@@ -104,6 +105,8 @@ class Scenario:
         reward: weights.
         limits: early ends.
         tolerance_m: position error that counts as good in the report, m.
+        domain_randomization: what differs from episode to episode; what is said above is the middle that policies
+            are made for.
     """
 
     title: Text = ""
@@ -122,6 +125,7 @@ class Scenario:
     reward: Reward = Reward()
     limits: Limits = Limits()
     tolerance_m: Positive = 50.0
+    domain_randomization: DomainRandomization | None = None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
@@ -146,6 +150,7 @@ class Scenario:
         self._check_clock()
         self._check_start()
         self.dropout.chain(self.dt_s, self.orbit)
+        self.variants()
         return self
 
     def _check_truth(self) -> None:
@@ -199,6 +204,10 @@ class Scenario:
                     f"reference, beyond limits.max_distance_m = {self.limits.max_distance_m:g} m"
                 )
             place, start_s = phase.formation.reference(end_s, self.orbit, arrival_s)[:3], end_s
+
+    def variants(self) -> tuple["Scenario", ...]:
+        """What its episodes fly, each one of these: what `domain_randomization` draws, else the scenario itself."""
+        return draw_variants(self)
 
     def steps(self, periods: float) -> int:
         """A time in orbital periods as the nearest number of whole steps."""

@@ -98,7 +98,12 @@ def build(cls: type[T], data: Any, where: str) -> T:
     try:
         return pydantic.TypeAdapter(cls).validate_python(data)
     except pydantic.ValidationError as error:
-        raise ConfigError("\n".join(f"{where}: {_describe(fault, data)}" for fault in error.errors())) from None
+        raise ConfigError("\n".join(f"{where}: {fault}" for fault in faults(error, data))) from None
+
+
+def faults(error: pydantic.ValidationError, data: Any = None) -> list[str]:
+    """One line for each fault that pydantic found in plain data, or in what was built in Python (then without data)."""
+    return [_describe(fault, data) for fault in error.errors()]
 
 
 def _describe(fault: ErrorDetails, data: Any) -> str:

@@ -157,6 +157,26 @@ def test_staggered_rows_end_at_different_times() -> None:
     assert steps == expected
 
 
+def test_rows_of_different_variants_are_staggered_too() -> None:
+    """Coasting variants of different lengths: ends spread over an episode, and each episode as long as its variant."""
+    ranges = {"variants": 8, "altitude_m": [300e3, 3000e3]}
+    scenario = short_scenario(limits={"max_distance_m": 50e3}, domain_randomization=ranges)
+    lengths = {variant.num_steps for variant in scenario.variants()}
+    assert len(lengths) > 4
+    adapter = Sb3VecEnv(32, scenario, stagger=True)
+    adapter.seed(5)
+    adapter.reset()
+    coast, ends = np.zeros((32, 3), np.float32), [list[int]() for _ in range(32)]
+    for step in range(3 * max(lengths)):
+        _, _, dones, infos = adapter.step(coast)
+        for row in np.flatnonzero(dones):
+            assert infos[row]["episode"]["l"] in lengths
+            assert not ends[row] or step - ends[row][-1] == infos[row]["episode"]["l"]
+            ends[row].append(step)
+    assert min(len(times) for times in ends) >= 2
+    assert len({times[0] for times in ends}) > 0.7 * min(lengths)
+
+
 def test_attributes_and_methods_of_the_shared_environment(scenario: Scenario) -> None:
     """The rows share one environment: reading is for any of them, changing only for all."""
     adapter = Sb3VecEnv(ROWS, scenario)

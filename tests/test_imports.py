@@ -17,7 +17,7 @@ LAYERS = (
     {"kepler", "elements", "frames", "ephemeris", "gauss", "atmosphere"},
     {"orbit", "spacecraft", "perturbations"},
     {"dynamics", "formations", "dropout", "estimation", "propagation"},
-    {"scenario", "observation", "schedule"},
+    {"randomization", "scenario", "observation", "schedule"},
     {"kernel"},
     {"metrics"},
     {"envs"},

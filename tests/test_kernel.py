@@ -155,6 +155,14 @@ def test_the_program_carries_the_hash_of_its_sources() -> None:
     assert 0 <= program._source_hash() < 2**63
 
 
+@pytest.mark.parametrize("varied", [False, True])
+def test_programs_close_over_numbers_only(varied: bool) -> None:
+    """numba's cache takes what a function closes over into its key; a function there is another in each process."""
+    for function in program.program(packing.CONSTANT_MODEL, packing.CONSTANT_MODEL, varied):
+        cells = [cell.cell_contents for cell in function.py_func.__closure__]
+        assert all(type(cell) in (int, bool) for cell in cells)
+
+
 def test_reset_writes_the_rows_asked_for_only() -> None:
     """Rows are reset in groups of a tile's width; nothing but those asked for is written, nor past the array's end."""
     simulation = Simulation(load_scenario("keeping"), 40)

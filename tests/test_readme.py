@@ -33,7 +33,9 @@ def test_scenario_example_loads(tmp_path: Path) -> None:
     (example,) = blocks("yaml")
     path = tmp_path / "example.yaml"
     path.write_text(example, encoding="utf-8")
-    assert load_scenario(path).sensor.measures == "position"
+    scenario = load_scenario(path)
+    assert scenario.sensor.measures == "position"
+    assert len(scenario.variants()) == 64
 
 
 def test_everything_is_named_and_pictures_exist() -> None:

@@ -126,7 +126,7 @@ FOLLOWING = "formation: {kind: following}"
 # What is in the file, and what the one line of the error says after the file's name.
 FAULTS = {
     "unknown key": (PHASES + "sensors: {}\n", "sensors: unknown key; did you mean 'sensor'?"),
-    "unknown key like none": (PHASES + "zzz: 1\n", "zzz: unknown key; known: dropout, dt_s, .*"),
+    "unknown key like none": (PHASES + "zzz: 1\n", "zzz: unknown key; known: domain_randomization, dropout, .*"),
     "number as key": (PHASES + "3: 1\n", "3: unknown key; known: .*"),
     "nested key": (PHASES + "sensor: {sigma_pos: 1}\n", "sensor.sigma_pos: unknown key; did you mean 'sigma_pos_m'?"),
     "orbit's key": (PHASES + "orbit: {altitude: 1}\n", "orbit.altitude: unknown key; did you mean 'altitude_m'?"),

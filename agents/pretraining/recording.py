@@ -42,11 +42,13 @@ def record_disturbances(scenario: Scenario, seeds: Sequence[int]) -> Recording:
     """Fly one episode per seed without thrust.
 
     Raises:
-        ConfigError: the truth is nonlinear, so that disturbances and thrust do not simply add up, or an episode
-            ended early.
+        ConfigError: the truth is nonlinear, so that disturbances and thrust do not simply add up, or differs from
+            episode to episode, or an episode ended early.
     """
     if scenario.dynamics == NONLINEAR:
         raise ConfigError("pretraining: the gradient through the model needs a linear truth; set updates: 0")
+    if scenario.domain_randomization is not None:
+        raise ConfigError("pretraining: the gradient needs one model, domain_randomization has many; set updates: 0")
     env, steps, rows = FormationVectorEnv(len(seeds), scenario), scenario.num_steps, len(seeds)
     states, errors = np.empty((steps + 1, rows, 6)), np.empty((steps, rows, 6))
     rest = np.empty((steps, rows, SIZE - REST.start), np.float32)

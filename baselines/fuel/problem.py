@@ -71,6 +71,7 @@ def episode_problem(
     Raises:
         ValueError: a nonlinear truth, both a seed and a state, a state of wrong shape, or no transfer to arrive from.
     """
+    scenario = scenario if seed is None else flown_scenario(scenario, seed)
     start = start_of(scenario, legs(scenario)[0], initial_state)
     if seed is not None and initial_state is not None:
         raise ValueError(f"initial_state: give it or a seed, not both; got seed = {seed}")
@@ -93,6 +94,14 @@ def episode_problem(
         limit=scenario.spacecraft.max_accel_m_s2 * np.abs(gains),
         met=met,
     )
+
+
+def flown_scenario(scenario: Scenario, seed: int) -> Scenario:
+    """What the episode of a seed flies: the scenario, or with domain randomization one of its variants."""
+    if scenario.domain_randomization is None:
+        return scenario
+    env = FormationEnv(scenario)
+    return scenario.variants()[env.reset(seed=seed)[1]["variant"]]
 
 
 def start_of(scenario: Scenario, leg: Leg, initial_state: ArrayLike | None) -> Array:

@@ -13,6 +13,7 @@ from formation_env import observation
 from formation_env.dynamics.base import Array
 from formation_env.kernel import tile as f
 from formation_env.kernel.simulation import Simulation
+from formation_env.scenario import Scenario
 
 INFO_STATES: Final = {"true_state": (f.TRUTH, 6), "estimate": (f.ESTIMATE, 6)}
 """Info key: first state field, size."""
@@ -27,6 +28,8 @@ INFO_SCALARS: Final[dict[str, tuple[int, type]]] = {
     "phase": (f.PHASE, int),
 }
 """Info key: result field, type."""
+INFO_VARIANT: Final = {"variant": (f.VARIANT, int)}
+"""The same, of scenarios with domain randomization."""
 _Float32Space = spaces.Space[NDArray[np.float32]]
 TOTALS: Final = "episode_totals"
 START_OPTION: Final = "initial_state"
@@ -42,11 +45,16 @@ def observation_space() -> spaces.Space[NDArray[np.float32]]:
     return cast(_Float32Space, spaces.Box(-observation.BOUND, observation.BOUND, (observation.SIZE,), np.float32))
 
 
+def info_scalars(scenario: Scenario) -> dict[str, tuple[int, type]]:
+    """The infos of one number that a scenario's environments give: key, result field, type."""
+    return INFO_SCALARS if scenario.domain_randomization is None else INFO_SCALARS | INFO_VARIANT
+
+
 def read_start(options: Mapping[str, Any] | None, simulation: Simulation) -> Array | None:
     """The start given in reset's options, as (num_rows, 6), or None.
 
     Raises:
-        ValueError: an unknown option, or a start of wrong shape, not finite, or beyond the limits.
+        ValueError: an unknown option, or a start of wrong shape, not finite, or beyond the limits of any variant.
     """
     num_rows, limits = simulation.num_rows, simulation.scenario.limits
     unknown = set(options or {}) - {START_OPTION}
@@ -62,9 +70,10 @@ def read_start(options: Mapping[str, Any] | None, simulation: Simulation) -> Arr
     position, speed = given[..., :3], np.linalg.norm(given[..., 3:], axis=-1)
     if (np.linalg.norm(position, axis=-1) < limits.keep_out_m).any():
         raise ValueError(f"{START_OPTION}: inside the keep-out sphere of {limits.keep_out_m:g} m: {given}")
-    if (np.linalg.norm(position - simulation.first_reference_m, axis=-1) > limits.max_distance_m).any():
+    distances_m = np.linalg.norm(position[..., None, :] - simulation.first_references_m, axis=-1)
+    if (distances_m > limits.max_distance_m).any():
         raise ValueError(f"{START_OPTION}: farther than {limits.max_distance_m:g} m from the reference: {given}")
-    if (speed > simulation.scenario.orbit.speed_m_s).any():
+    if (speed > min(flown.orbit.speed_m_s for flown in simulation.variants)).any():
         raise ValueError(f"{START_OPTION}: faster than the orbit itself: {given}")
     return np.broadcast_to(given, (num_rows, 6))
 

@@ -50,6 +50,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.action_space = interface.action_space()
         self.observation_space = interface.observation_space()
         self.simulation = Simulation(self.scenario, 1)
+        self._info_scalars = interface.info_scalars(self.scenario)
         self._keyed = False
         self._renderer: Any = None
 
@@ -110,7 +111,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             name: self.simulation.row_state(field, size) for name, (field, size) in interface.INFO_STATES.items()
         }
         info[interface.INFO_THRUST] = np.array(values[_THRUST : _THRUST + 3])
-        for name, (field, kind) in interface.INFO_SCALARS.items():
+        for name, (field, kind) in self._info_scalars.items():
             info[name] = kind(values[(field - f.RESULTS) // LANES])
         return info
 

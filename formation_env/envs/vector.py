@@ -59,6 +59,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.simulation = Simulation(self.scenario, num_envs)
+        self._info_scalars = interface.info_scalars(self.scenario)
         self._observations = self.simulation.new_observations()
         self._keyed = False
 
@@ -151,7 +152,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             name: simulation.state(field, size, rows) for name, (field, size) in interface.INFO_STATES.items()
         }
         infos[interface.INFO_THRUST] = simulation.result_vector(f.THRUST, 3, rows)
-        for name, (field, kind) in interface.INFO_SCALARS.items():
+        for name, (field, kind) in self._info_scalars.items():
             infos[name] = simulation.result(field, rows).astype(kind)
         return self._spread(infos, rows)
 

@@ -2,19 +2,19 @@
 
 from formation_env.dynamics.base import Array
 from formation_env.jit import LANES, lane
-from formation_env.kernel.packing import MODEL_SIZE, Model, ProcessNoise, unpack_model, unpack_process
+from formation_env.kernel.packing import Model, ProcessNoise, unpack_model, unpack_process
 
 
 @lane
 def read_model(t: Array, i: int, table: int) -> Model:
-    """The row's own model, which its plan has at `table`."""
-    return unpack_model(t[table + i :: LANES])
+    """The row's own model, which the tile has at `table`."""
+    return unpack_model(t, table + i, LANES)
 
 
 @lane
 def read_process(t: Array, i: int, table: int) -> ProcessNoise:
     """The row's own process noise, behind the model at `table`."""
-    return unpack_process(t[table + MODEL_SIZE * LANES + i :: LANES])
+    return unpack_process(t, table + i, LANES)
 
 
 @lane

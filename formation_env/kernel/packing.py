@@ -3,16 +3,16 @@
 `pack` writes the named tuples below one after the other; `unpack` reads them back inside the compiled step, as scalars.
 """
 
+from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numba.np.unsafe import ndarray as numba_arrays
 
 from formation_env.dynamics import NONLINEAR, DiscreteModel
 from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, Array
 from formation_env.dynamics.nonlinear import leader_table, substeps
 from formation_env.estimation import process_noise_covariance, upper_triangle
-from formation_env.jit import lane
+from formation_env.jit import lane, spaced
 from formation_env.scenario import Scenario
 from formation_env.schedule import build_schedule, observation_layout
 
@@ -92,18 +92,17 @@ class Scalars(NamedTuple):
     per_phase: float
 
 
-to_fixed_tuple: Any = numba_arrays.to_fixed_tuple
-
 MODEL_SIZE: Final = 36
 PROCESS_SIZE: Final = 13
 BELIEF_SIZE: Final = MODEL_SIZE + PROCESS_SIZE
 SENSOR_SIZE: Final = 4
 FORCES_SIZE: Final = len(Forces._fields)
 SCALAR_SIZE: Final = len(Scalars._fields)
-_BELIEF: Final = MODEL_SIZE
-_SENSOR: Final = _BELIEF + BELIEF_SIZE
+BELIEF: Final = MODEL_SIZE
+_SENSOR: Final = BELIEF + BELIEF_SIZE
 _FORCES: Final = _SENSOR + SENSOR_SIZE
 _SCALARS: Final = _FORCES + FORCES_SIZE
+SIZE: Final = _SCALARS + SCALAR_SIZE
 
 
 def truth_kind(scenario: Scenario) -> int:
@@ -122,17 +121,29 @@ def _linear_kind(model: DiscreteModel) -> int:
     return VARYING_MODEL if model.Phi.ndim == 3 else CONSTANT_MODEL
 
 
+@lru_cache(maxsize=2)
+def pack_variants(scenarios: tuple[Scenario, ...]) -> tuple[Array, Array]:
+    """Tables (variants, steps, columns), each as long as the longest by repeating its end; settings (variants, SIZE).
+
+    The arrays are shared by all who ask for them; nobody writes into them.
+    """
+    tables = [step_table(scenario) for scenario in scenarios]
+    longest = max(len(table) for table in tables)
+    plans = np.stack([np.pad(table, ((0, longest - len(table)), (0, 0)), mode="edge") for table in tables])
+    return plans, np.stack([pack(scenario) for scenario in scenarios])
+
+
 def pack(scenario: Scenario) -> Array:
-    """Settings (_SCALARS + SCALAR_SIZE,). Models that vary are left 0 here; `step_table` has them.
+    """Settings (SIZE,). Models that vary are left 0 here; `step_table` has them.
 
     Raises:
         ValueError: a dynamics model couples the orbit plane and the cross-track axis.
     """
-    settings = np.zeros(_SCALARS + SCALAR_SIZE)
+    settings = np.zeros(SIZE)
     if truth_kind(scenario) == CONSTANT_MODEL:
-        settings[:_BELIEF] = _model(scenario.true_model())
+        settings[:BELIEF] = _model(scenario.true_model())
     if belief_kind(scenario) == CONSTANT_MODEL:
-        settings[_BELIEF:_SENSOR] = _belief(scenario)
+        settings[BELIEF:_SENSOR] = _belief(scenario)
     settings[_SENSOR:_FORCES] = np.ravel(_sensor(scenario))
     settings[_FORCES:_SCALARS] = _forces(scenario)
     settings[_SCALARS:] = _scalars(scenario)
@@ -159,33 +170,53 @@ def step_table(scenario: Scenario) -> Array:
 @lane
 def unpack(s: Array) -> tuple[Model, Model, ProcessNoise, SensorNoise, Forces, Scalars]:
     """The settings as tuples of scalars, so that the compiler need not read memory to know them."""
-    sensor = SensorNoise(
-        to_fixed_tuple(s[_SENSOR : _SENSOR + 2], 2),
-        to_fixed_tuple(s[_SENSOR + 2 : _FORCES], 2),
-    )
-    forces = Forces(*to_fixed_tuple(s[_FORCES:_SCALARS], FORCES_SIZE))
-    scalars = Scalars(*to_fixed_tuple(s[_SCALARS:], SCALAR_SIZE))
-    process = unpack_process(s[_BELIEF + MODEL_SIZE : _SENSOR])
-    return unpack_model(s[:_BELIEF]), unpack_model(s[_BELIEF : _BELIEF + MODEL_SIZE]), process, sensor, forces, scalars
+    truth, belief, process = unpack_model(s, 0, 1), unpack_model(s, BELIEF, 1), unpack_process(s, BELIEF, 1)
+    return truth, belief, process, unpack_sensor(s, 0, 1), unpack_forces(s, 0, 1), unpack_scalars(s, 0, 1)
 
 
 @lane
-def unpack_model(s: Array) -> Model:
-    """A model from its numbers (MODEL_SIZE,)."""
+def unpack_model(s: Array, first: int, step: int) -> Model:
+    """A model from its MODEL_SIZE numbers.
+
+    Args:
+        s: where they are, among others.
+        first: place of the first.
+        step: from one to the next.
+    """
     return Model(
-        to_fixed_tuple(s[0:16], 16),
-        to_fixed_tuple(s[16:24], 8),
-        to_fixed_tuple(s[24:28], 4),
-        to_fixed_tuple(s[28:32], 4),
-        to_fixed_tuple(s[32:34], 2),
-        to_fixed_tuple(s[34:36], 2),
+        spaced(s, first, step, 16),
+        spaced(s, first + 16 * step, step, 8),
+        spaced(s, first + 24 * step, step, 4),
+        spaced(s, first + 28 * step, step, 4),
+        spaced(s, first + 32 * step, step, 2),
+        spaced(s, first + 34 * step, step, 2),
     )
 
 
 @lane
-def unpack_process(s: Array) -> ProcessNoise:
-    """Process noise from its numbers (PROCESS_SIZE,)."""
-    return ProcessNoise(to_fixed_tuple(s[0:10], 10), to_fixed_tuple(s[10:13], 3))
+def unpack_process(s: Array, first: int, step: int) -> ProcessNoise:
+    """The process noise behind the filter's model, which is at `first`."""
+    first += MODEL_SIZE * step
+    return ProcessNoise(spaced(s, first, step, 10), spaced(s, first + 10 * step, step, 3))
+
+
+@lane
+def unpack_sensor(s: Array, first: int, step: int) -> SensorNoise:
+    """The sensor out of all settings, which begin at `first`."""
+    first += _SENSOR * step
+    return SensorNoise(spaced(s, first, step, 2), spaced(s, first + 2 * step, step, 2))
+
+
+@lane
+def unpack_forces(s: Array, first: int, step: int) -> Forces:
+    """The forces out of all settings, which begin at `first`."""
+    return Forces(*spaced(s, first + _FORCES * step, step, FORCES_SIZE))
+
+
+@lane
+def unpack_scalars(s: Array, first: int, step: int) -> Scalars:
+    """The settings of one number each out of all settings, which begin at `first`."""
+    return Scalars(*spaced(s, first + _SCALARS * step, step, SCALAR_SIZE))
 
 
 def _block(matrices: Array, rows: Array, columns: Array) -> Array:

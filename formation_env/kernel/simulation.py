@@ -23,7 +23,8 @@ class Simulation:
     Attributes:
         scenario: what is flown.
         num_rows: episodes side by side.
-        schedule: the plan's table, see `schedule.FIELDS`.
+        variants: what is drawn from for each episode: the scenario alone, or its variants.
+        schedule: the plans' tables (variants, steps, columns), see `schedule.FIELDS`; a shorter one repeats its end.
         actions: (num_rows, 3) float32, to be filled before `step`.
         results: (fields, rows and padding), of the last step or reset.
     """
@@ -32,15 +33,16 @@ class Simulation:
         tiles = -(-num_rows // LANES)
         self.scenario = scenario
         self.num_rows = num_rows
-        self.schedule = packing.step_table(scenario)
+        self.variants = scenario.variants()
+        self.schedule, self._settings = packing.pack_variants(self.variants)
         self.actions = np.zeros((num_rows, 3), np.float32)
         self.results = np.zeros((f.NUM_RESULTS, tiles * LANES))
-        self._settings = packing.pack(scenario)
         self._states = np.zeros((tiles, f.STATE_FIELDS * LANES))
-        self._scratch = np.zeros((f.TILE_FIELDS + self.schedule.shape[1] - WIDTH) * LANES)
-        self._kinds = (packing.truth_kind(scenario), packing.belief_kind(scenario))
+        self._scratch = np.zeros((f.TILE_FIELDS + self.schedule.shape[2] - WIDTH) * LANES)
+        varied = len(self.variants) > 1
+        self._program = (packing.truth_kind(scenario), packing.belief_kind(scenario), varied)
         self._lane_set = (False,) * (1 if num_rows == 1 else LANES)
-        self._nominal_start = scenario.start.formation.state(scenario.orbit)
+        self._nominal_starts = np.array([flown.start.formation.state(flown.orbit) for flown in self.variants])
 
     def seed(self, row: int, generator: np.random.Generator) -> None:
         """Give a row a new random stream; its next episode is the stream's first."""
@@ -56,8 +58,8 @@ class Simulation:
             observations: (num_rows, SIZE), written in these rows.
             starts: LVLH states (k, 6) to start at, in place of the scenario's start and its spread.
         """
-        places = np.tile(self._nominal_start, (len(rows), 1)) if starts is None else np.ascontiguousarray(starts)
-        program(*self._kinds).reset(
+        places = self._nominal_starts if starts is None else np.ascontiguousarray(starts)
+        program(*self._program).reset(
             self._states,
             self._scratch,
             self.schedule,
@@ -76,7 +78,7 @@ class Simulation:
         Args:
             observations: (num_rows, SIZE), written.
         """
-        program(*self._kinds).step(
+        program(*self._program).step(
             self._states,
             self._scratch,
             self.schedule,
@@ -109,10 +111,19 @@ class Simulation:
         return self.results[first : first + size, : self.num_rows].T[rows].copy()
 
     @property
-    def first_reference_m(self) -> Array:
-        """Reference position (3,) at the start, m."""
+    def first_references_m(self) -> Array:
+        """The variants' reference positions at the start (variants, 3), m."""
         first = OFFSETS["scored_position"]
-        return self.schedule[0, first : first + 3]
+        return self.schedule[:, 0, first : first + 3]
+
+    def variant(self, rows: Rows = slice(None)) -> NDArray[np.intp]:
+        """Which of the variants rows flew in the last step, or begin (rows,)."""
+        return self.result(f.VARIANT, rows).astype(np.intp)
+
+    @property
+    def flown(self) -> Scenario:
+        """What the first row flies."""
+        return self.variants[int(self.variant()[0])]
 
     def state(self, field: int, size: int, rows: Rows = slice(None)) -> Array:
         """Copy (rows, size) of consecutive state fields."""

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_env.dynamics.base import Array
-from formation_env.jit import LANES, lane, stage
+from formation_env.jit import LANES, stage
 from formation_env.kernel import filter, lanes, packing
 from formation_env.kernel import tile as f
 from formation_env.kernel.linear import read_model, read_process
 from formation_env.kernel.tile import LaneSet
+from formation_env.kernel.variants import column, own_scalars, own_sensor
 from formation_env.observation import SIZE
-from formation_env.schedule import WIDTH
 
 STATE_SIZE: Final = f.STATE_FIELDS * LANES
 
@@ -57,17 +57,24 @@ def store(
 
 
 @stage
-def gather(t: Array, lane_set: LaneSet, states: Array, rows: NDArray[np.intp], starts: Array, first: int) -> None:
-    """Rows from `first` on side by side into scratch space, at the start of their next episode."""
+def gather(t: Array, lane_set: LaneSet, states: Array, rows: NDArray[np.intp], first: int) -> None:
+    """Rows from `first` on side by side into scratch space, on the way to the start of their next episode."""
     for i in range(len(lane_set)):
         source = min(first + i, len(rows) - 1)  # idle lanes repeat the last row
         tile, lane = rows[source] // LANES, rows[source] % LANES
         for k in range(f.STATE_FIELDS):
             t[k * LANES + i] = states[tile, k * LANES + lane]
-        for k in range(6):
-            t[f.TRUTH + k * LANES + i] = starts[source, k]
         t[f.STEP + i] = 0.0
         t[f.EPISODE + i] += 1.0
+
+
+@stage
+def place(t: Array, lane_set: LaneSet, starts: Array, given: bool, first: int) -> None:
+    """Where the rows start: each where it is told to, if that is given, else where its variant does."""
+    for i in range(len(lane_set)):
+        source = min(first + i, len(starts) - 1) if given else int(t[f.VARIANT + i])
+        for k in range(6):
+            t[f.TRUTH + k * LANES + i] = starts[source, k]
 
 
 @stage
@@ -103,12 +110,12 @@ def draw(t: Array, lane_set: LaneSet, first_block: int) -> None:
 
 
 @stage
-def thrust(t: Array, lane_set: LaneSet, c: packing.Scalars) -> None:
+def thrust(t: Array, lane_set: LaneSet, c: packing.Scalars | None) -> None:
     """Thruster and link."""
     for i in range(len(lane_set)):
-        lanes.thruster(t, i, c)
+        lanes.thruster(t, i, own_scalars(t, i, c))
     for i in range(len(lane_set)):
-        lanes.link(t, i, c)
+        lanes.link(t, i, own_scalars(t, i, c))
 
 
 @stage
@@ -119,53 +126,48 @@ def predict(t: Array, lane_set: LaneSet, model: packing.Model, noise: packing.Pr
 
 
 @stage
-def predict_varying(t: Array, lane_set: LaneSet, c: packing.Scalars) -> None:
-    """The same by the step's own model."""
+def predict_varying(t: Array, lane_set: LaneSet, table: int, c: packing.Scalars | None) -> None:
+    """The same by the row's own model, which the tile has at `table`."""
     for i in range(len(lane_set)):
-        filter.filter_time_update(t, i, read_model(t, i, f.TABLE), read_process(t, i, f.TABLE), c)
+        model, noise = read_model(t, i, table), read_process(t, i, table)
+        filter.filter_time_update(t, i, model, noise, own_scalars(t, i, c))
 
 
 @stage
-def measure(t: Array, lane_set: LaneSet, sensor: packing.SensorNoise, c: packing.Scalars) -> None:
+def measure(t: Array, lane_set: LaneSet, sensor: packing.SensorNoise | None, c: packing.Scalars | None) -> None:
     """Measurement and the filter's measurement update."""
     for i in range(len(lane_set)):
-        lanes.dropout(t, i, c)
+        lanes.dropout(t, i, own_scalars(t, i, c))
     for i in range(len(lane_set)):
-        filter.filter_measurement_update(t, i, sensor, c)
+        filter.filter_measurement_update(t, i, own_sensor(t, i, sensor), own_scalars(t, i, c))
 
 
 @stage
-def judge(t: Array, lane_set: LaneSet, c: packing.Scalars) -> None:
+def judge(t: Array, lane_set: LaneSet, c: packing.Scalars | None) -> None:
     """Reward, end and totals."""
     for i in range(len(lane_set)):
-        lanes.reward_and_end(t, i, c)
+        lanes.reward_and_end(t, i, own_scalars(t, i, c))
     for i in range(len(lane_set)):
-        lanes.totals(t, i, c)
+        lanes.totals(t, i, own_scalars(t, i, c))
 
 
 @stage
-def observe(t: Array, lane_set: LaneSet, c: packing.Scalars) -> None:
+def observe(t: Array, lane_set: LaneSet, c: packing.Scalars | None) -> None:
     """The observation."""
     for axis in range(6):
         for i in range(len(lane_set)):
-            lanes.observe_error(t, i, axis, c)
+            lanes.observe_error(t, i, axis, own_scalars(t, i, c))
     for i in range(len(lane_set)):
-        lanes.observe_arrival(t, i, c)
+        lanes.observe_arrival(t, i, own_scalars(t, i, c))
     for i in range(len(lane_set)):
-        lanes.observe_rest(t, i, c)
+        lanes.observe_rest(t, i, own_scalars(t, i, c))
 
 
 @stage
-def begin(t: Array, lane_set: LaneSet, given: bool, c: packing.Scalars) -> None:
+def begin(t: Array, lane_set: LaneSet, given: bool, c: packing.Scalars | None) -> None:
     """The start of an episode."""
     for i in range(len(lane_set)):
-        lanes.begin(t, i, given, c)
-
-
-@lane
-def _column(k: int) -> int:
-    """Where a column of the schedule stands in the tile."""
-    return f.PLAN + k * LANES if k < WIDTH else f.TABLE + (k - WIDTH) * LANES
+        lanes.begin(t, i, given, own_scalars(t, i, c))
 
 
 @stage
@@ -176,7 +178,7 @@ def read_plan(t: Array, lane_set: LaneSet, used: int, schedule: Array, known_ste
         t: the tile.
         lane_set: as long as the lanes computed.
         used: how many of them are rows; the others do not matter.
-        schedule: the table.
+        schedule: the table (steps, columns).
         known_step: the step whose row the whole tile holds, or -1.
 
     Returns:
@@ -193,10 +195,10 @@ def read_plan(t: Array, lane_set: LaneSet, used: int, schedule: Array, known_ste
         for k in range(schedule.shape[1]):
             value = schedule[first, k]
             for i in range(len(lane_set)):
-                t[_column(k) + i] = value
+                t[column(k) + i] = value
         return first
     for i in range(len(lane_set)):
         step = min(int(t[f.STEP + i]), last)
         for k in range(schedule.shape[1]):
-            t[_column(k) + i] = schedule[step, k]
+            t[column(k) + i] = schedule[step, k]
     return -1

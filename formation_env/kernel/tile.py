@@ -8,6 +8,7 @@ from typing import Final
 
 from formation_env import observation, schedule
 from formation_env.jit import LANES
+from formation_env.kernel import packing
 
 LaneSet = tuple[bool, ...]
 """Its length says how many rows of a tile are computed."""
@@ -65,6 +66,7 @@ EXIT_COST: Final = _field()
 NIS: Final = _field()  # normalised innovation squared
 MEASURED: Final = _field()
 PHASE: Final = _field()
+VARIANT: Final = _field()  # which of the scenario's variants is flown
 NUM_RESULTS: Final = _next_field - RESULTS // LANES
 OBSERVATION: Final = _field(observation.SIZE)
 # For the true motion.
@@ -72,6 +74,7 @@ PUSH: Final = _field(3)  # thrust and random acceleration along LVLH, m/s^2
 RELATIVE: Final = _field(6)  # position and velocity relative to the leader along inertial axes
 BEFORE: Final = _field(6)  # the same at the substep's start
 RATES: Final = _field(42)  # of each stage
+SETTINGS: Final = _field(packing.SIZE)  # of the row's variant, if there are several
 TABLE: Final = _next_field * LANES  # what else the plan's row has, see `packing.step_table`; as long as need be
 TILE_FIELDS: Final = _next_field
 

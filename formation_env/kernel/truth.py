@@ -15,6 +15,7 @@ from formation_env.kernel import tile as f
 from formation_env.kernel.linear import propagate, read_model
 from formation_env.kernel.packing import Forces, Model, Scalars
 from formation_env.kernel.tile import LaneSet
+from formation_env.kernel.variants import own_forces, own_scalars
 
 # Butcher's method of order 6 with 7 stages (Butcher 1964, "On Runge-Kutta processes of high order"). The last row
 # gives the step's end.
@@ -63,16 +64,16 @@ def fly_linear(t: Array, lane_set: LaneSet, model: Model, c: Scalars) -> None:
 
 
 @stage
-def fly_varying(t: Array, lane_set: LaneSet, table: int, c: Scalars) -> None:
-    """The same with the step's own matrices, which the plan's row has at `table`."""
+def fly_varying(t: Array, lane_set: LaneSet, table: int, c: Scalars | None) -> None:
+    """The same with the row's own matrices, which the tile has at `table`."""
     for i in range(len(lane_set)):
-        total_acceleration(t, i, c)
+        total_acceleration(t, i, own_scalars(t, i, c))
     for i in range(len(lane_set)):
         _linear(t, i, read_model(t, i, table))
 
 
 @stage
-def fly_nonlinear(t: Array, lane_set: LaneSet, table: int, far: bool, forces: Forces, c: Scalars) -> None:
+def fly_nonlinear(t: Array, lane_set: LaneSet, table: int, far: bool, forces: Forces | None, c: Scalars | None) -> None:
     """Integrate the follower's motion relative to the leader along inertial axes (see `dynamics.nonlinear`).
 
     Args:
@@ -84,11 +85,12 @@ def fly_nonlinear(t: Array, lane_set: LaneSet, table: int, far: bool, forces: Fo
         c: the scenario's numbers.
     """
     width = (FAR_WIDTH if far else NEAR_WIDTH) * LANES
-    substeps = int(forces.substeps)
+    dt_s, count = own_scalars(t, 0, c).dt_s, own_forces(t, 0, forces).substeps  # the same for all rows
+    substeps = int(count)
     last = table + len(NODES) * substeps * width
-    step_s = c.dt_s / forces.substeps
+    step_s = dt_s / count
     for i in range(len(lane_set)):
-        total_acceleration(t, i, c)
+        total_acceleration(t, i, own_scalars(t, i, c))
     for i in range(len(lane_set)):
         _to_inertial(t, i, table, last + width)
     for substep in range(substeps):
@@ -120,13 +122,13 @@ def _combine(t: Array, lane_set: LaneSet, number: int, step_s: float) -> None:
 
 
 @stage
-def _rates(t: Array, lane_set: LaneSet, node: int, rate: int, far: bool, forces: Forces) -> None:
+def _rates(t: Array, lane_set: LaneSet, node: int, rate: int, far: bool, forces: Forces | None) -> None:
     """Rates of the relative position and velocity at a node."""
     for i in range(len(lane_set)):
-        _near(t, node + i, f.RELATIVE + i, rate + i, f.PUSH + i, forces)
+        _near(t, node + i, f.RELATIVE + i, rate + i, f.PUSH + i, own_forces(t, i, forces))
     if far:
         for i in range(len(lane_set)):
-            _distant(t, node + i, f.RELATIVE + i, rate + i, forces)
+            _distant(t, node + i, f.RELATIVE + i, rate + i, own_forces(t, i, forces))
 
 
 @lane

@@ -55,7 +55,7 @@ def read_moment(simulation: Simulation) -> Moment:
         truth=simulation.row_state(f.TRUTH, 3),
         estimate=simulation.row_state(f.ESTIMATE, 3),
         covariance=np.array([[xx, xy, 0], [xy, yy, 0], [0, 0, z_variance]]),
-        thrust=simulation.results[first : first + 3, 0] / simulation.scenario.spacecraft.max_accel_m_s2,
+        thrust=simulation.results[first : first + 3, 0] / simulation.flown.spacecraft.max_accel_m_s2,
         measured=bool(simulation.result(f.MEASURED)[0] > 0.5),
         age_s=float(simulation.row_state(f.AGE, 1)[0]),
         position_error_m=float(simulation.result(f.POSITION_ERROR)[0]),

@@ -36,7 +36,7 @@ class Renderer:
         modes = FormationEnv.metadata["render_modes"]
         if render_mode not in modes:
             raise ValueError(f"render_mode: must be one of {modes}, got {render_mode!r}")
-        self._scenario = scenario
+        self._flown = scenario
         self._mode = render_mode
         self._trail: deque[Moment] = deque(maxlen=max(2, scenario.steps(TRAIL_PERIODS)))
         self._scene: Scene | None = None
@@ -56,8 +56,9 @@ class Renderer:
         moment = read_moment(simulation)
         if not self._trail or self._trail[-1].step != moment.step:
             self._trail.append(moment)
-        if self._scene is None:
-            self._scene = Scene(self._scenario)
+        if self._scene is None or simulation.flown is not self._flown:
+            self._flown = simulation.flown
+            self._scene = Scene(self._flown)
         trail = np.array([past.truth for past in self._trail])
         frame = self._scene.draw(moment, trail, np.array([not past.measured for past in self._trail]))
         if self._window is None:

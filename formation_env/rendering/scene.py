@@ -93,7 +93,7 @@ class Scene:
         for view, (*_, name) in zip(self._views, _VIEWS, strict=True):
             view.axes.set_title(name, fontsize=9, color=GREY, pad=4)
         full_mm_s2 = 1000 * self._scenario.spacecraft.max_accel_m_s2
-        label = f"thrust (√ scale, ≤ {full_mm_s2:g} mm/s² per axis)"
+        label = f"thrust (√ scale, ≤ {full_mm_s2:.4g} mm/s² per axis)"
         thrust = {"color": GREEN, "marker": r"$\rightarrow$", "ls": "", "ms": 13, "label": label}
         lines = [Line2D([], [], **style) for style in (*STYLES.values(), thrust) if "label" in style]
         spacing = {"handletextpad": 0.4, "columnspacing": 1.1, "handlelength": 1.4, "borderaxespad": 0.5}
