@@ -115,7 +115,9 @@ def start_file(run: Run) -> Path | None:
     if not run.start or not start.is_dir():
         return start if run.start else None
     theirs = load_run(start)
-    pairs = {key: (getattr(run, key), getattr(theirs, key)) for key in ("scenario", "seed")}
+    if theirs.scenario != run.scenario:
+        raise ConfigError(f"{start}: is of {theirs.env}; its scenario must be this run's, {run.env}")
+    pairs = {"seed": (run.seed, theirs.seed)}
     pairs |= {key: (getattr(run.agent, key), getattr(theirs.agent, key)) for key in PRETRAINED_BY}
     for key, (wanted, got) in pairs.items():
         if wanted != got:

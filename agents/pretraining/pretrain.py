@@ -3,7 +3,7 @@
 import copy
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -68,22 +68,30 @@ def pretrain(
         if cost < least:
             best, least = copy.deepcopy(net), cost
 
+    models = _models(how, functions, scenario, episodes[how.rows * how.rounds :]) if how.updates else []
     if how.rounds:
         teacher = make_policy(how.teacher, scenario)
         rounds = [episodes[how.rows * i : how.rows * (i + 1)] for i in range(how.rounds)]
         imitate(net, power, teacher, scenario, rounds, functions.magnification, generator)
         judge(f"after imitating {how.teacher}")
-    if how.updates:
-        recorded = episodes[how.rows * how.rounds :]
-        model = ModelEpisodes(record_disturbances(scenario, recorded), functions.magnification)
-        descend(net, power, model, how, generator, judge)
+    if models:
+        descend(net, power, models, how, generator, judge)
     return _actor(best, functions, scenario)
+
+
+def _models(how: Pretraining, functions: Functions, scenario: Scenario, recorded: range) -> list[ModelEpisodes]:
+    """Recorded episodes, evenly shared among the scenario's variants."""
+    variants = scenario.variants()[: how.episodes]
+    return [
+        ModelEpisodes(record_disturbances(variant, recorded[k :: len(variants)]), functions.magnification)
+        for k, variant in enumerate(variants)
+    ]
 
 
 def descend(
     net: nn.Module,
     throttle_power: float,
-    model: ModelEpisodes,
+    models: Sequence[ModelEpisodes],
     how: Pretraining,
     generator: np.random.Generator,
     judge: Callable[[str], Any],
@@ -93,7 +101,7 @@ def descend(
     Args:
         net: from features to outputs; changed in place.
         throttle_power: p of the thrust sign(z) |z|^p that the outputs' z = tanh stands for.
-        model: the episodes.
+        models: the episodes of each variant of the scenario; each update takes those of one.
         how: how many updates, of which size.
         generator: chooses the episodes of each.
         judge: called with a text from time to time, and at the end.
@@ -103,6 +111,7 @@ def descend(
         torch.optim.lr_scheduler.LambdaLR(optimizer, lambda k: _share(k, how.updates)) for optimizer in optimizers
     ]
     for update in range(1, how.updates + 1):
+        model = models[generator.integers(len(models))]
         rows = torch.as_tensor(generator.choice(model.rows, min(how.batch, model.rows), replace=False))
         net.zero_grad()
         model.cost(net, throttle_power, rows).backward()

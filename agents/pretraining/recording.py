@@ -48,7 +48,9 @@ def record_disturbances(scenario: Scenario, seeds: Sequence[int]) -> Recording:
     if scenario.dynamics == NONLINEAR:
         raise ConfigError("pretraining: the gradient through the model needs a linear truth; set updates: 0")
     if scenario.domain_randomization is not None:
-        raise ConfigError("pretraining: the gradient needs one model, domain_randomization has many; set updates: 0")
+        raise ConfigError(
+            "domain_randomization: an episode is recorded of one variant; give one of scenario.variants()"
+        )
     env, steps, rows = FormationVectorEnv(len(seeds), scenario), scenario.num_steps, len(seeds)
     states, errors = np.empty((steps + 1, rows, 6)), np.empty((steps, rows, 6))
     rest = np.empty((steps, rows, SIZE - REST.start), np.float32)
