@@ -6,10 +6,10 @@ import subprocess
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Self
 
 import pandas as pd
-from pydantic import Field, Strict
+from pydantic import Field, Strict, model_validator
 
 from agents.actor import Actor, read_actor
 from agents.settings import SETTINGS, AgentSettings, Algorithm
@@ -66,6 +66,13 @@ class Run:
     start: Text = ""
     command: Text = ""
     versions: dict[str, str] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        """Refuse critics of after-states where a thrust leads elsewhere in each variant of the scenario."""
+        if getattr(self.agent, "after_state", False) and self.scenario.domain_randomization is not None:
+            raise ValueError("agent.after_state: must be false for a scenario with domain_randomization, got true")
+        return self
 
 
 def versions() -> dict[str, str]:

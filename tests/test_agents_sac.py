@@ -168,3 +168,9 @@ def test_the_actor_learns_at_a_rate_of_its_own_that_falls_to_nothing(tmp_path: P
     model._slow_down(-0.1)
     assert model.actor.optimizer.param_groups[0]["lr"] == 0
     assert model.critic.optimizer.param_groups[0]["lr"] == pytest.approx(2e-3)
+
+
+def test_after_states_need_one_model(tmp_path: Path) -> None:
+    """Where a thrust leads differs from variant to variant: said in one line, before anything is flown."""
+    with pytest.raises(ConfigError, match=r"agent.after_state: must be false for a scenario with domain_randomization"):
+        small_run(tmp_path, "sac", "after_state: true\n", env="keeping_randomized")
