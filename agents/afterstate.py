@@ -21,6 +21,7 @@ from stable_baselines3.sac.policies import SACPolicy
 from torch import Tensor, nn
 
 from agents.features import REST
+from agents.throttle import thrust_of
 from formation_env.dynamics.base import Array
 from formation_env.observation import SIZE, SLICES
 from formation_env.scenario import Scenario
@@ -129,7 +130,7 @@ class AfterStateCritic(ContinuousCritic):
 
     def forward(self, obs: Tensor, actions: Tensor) -> tuple[Tensor, ...]:
         """Each network's values (rows, 1) of actions (rows, 3) at observations (rows, SIZE)."""
-        thrusts = actions * actions.abs() ** (self._known.throttle_power - 1)
+        thrusts = thrust_of(actions, self._known.throttle_power)
         price = self._known.thrust_price * torch.sqrt((thrusts**2).sum(dim=1, keepdim=True) + SMOOTH_THRUST**2)
         features = self._foresight(obs, thrusts)
         return tuple(network(features) - price for network in self.q_networks)

@@ -5,13 +5,21 @@ speaks of a throttle z in [-1, 1], and the environment's action is sign(z) |z|^p
 coasting is a thousandth of the greatest thrust, while that itself stays in reach.
 """
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 
 def throttle(z: NDArray[np.float32], power: float) -> NDArray[np.float32]:
     """The environment's actions sign(z) |z|^power for throttles z (..., 3), both in [-1, 1] and of the same shape."""
     thrust: NDArray[Any] = np.copysign(np.abs(z) ** power, z)
     return thrust
+
+
+def thrust_of(z: "Tensor", power: float) -> "Tensor":
+    """The same of torch's tensors, with a gradient at zero, too."""
+    return z * z.abs() ** (power - 1)

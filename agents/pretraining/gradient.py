@@ -14,6 +14,7 @@ from torch import Tensor, nn
 
 from agents.features import CUT
 from agents.pretraining.recording import Recording
+from agents.throttle import thrust_of
 from formation_env.observation import LOG_RANGE, LOG_UNIT_POS_M, LOG_UNIT_VEL_M_S
 from formation_env.schedule import build_schedule, coast_matrices, column, columns, observation_layout
 
@@ -21,11 +22,6 @@ SMOOTH_M: Final = 1e-2
 """Errors below this are not told from zero; the root has no gradient there."""
 SMOOTH_THROTTLE: Final = 1e-5
 """The same for thrusts, in units of the greatest."""
-
-
-def thrust_of(z: Tensor, throttle_power: float) -> Tensor:
-    """Actions sign(z) |z|^p for throttles z of any shape, as `agents.throttle` has them."""
-    return z * z.abs() ** (throttle_power - 1)
 
 
 class ModelEpisodes:

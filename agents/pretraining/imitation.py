@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from agents.features import features
-from agents.pretraining.gradient import thrust_of
+from agents.throttle import thrust_of
 from formation_env.envs import FormationVectorEnv
 from formation_env.evaluation import Policy
 from formation_env.scenario import Scenario

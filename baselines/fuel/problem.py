@@ -101,7 +101,8 @@ def flown_scenario(scenario: Scenario, seed: int) -> Scenario:
     if scenario.domain_randomization is None:
         return scenario
     env = FormationEnv(scenario)
-    return scenario.variants()[env.reset(seed=seed)[1]["variant"]]
+    env.reset(seed=seed)
+    return env.simulation.flown
 
 
 def start_of(scenario: Scenario, leg: Leg, initial_state: ArrayLike | None) -> Array:
