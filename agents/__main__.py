@@ -10,8 +10,8 @@ from typing import Annotated
 
 import typer
 
-from agents.shipped import SHIPPED
-from baselines.commands import (
+from agents.policy.library import SHIPPED
+from baselines.cli import (
     PROCESSES,
     BoundEpisodes,
     Envs,
@@ -79,9 +79,9 @@ def train(
 ) -> None:
     """Train a policy; keep the best on the validation seeds. Ctrl-C saves and ends; --resume FOLDER goes on."""
     with _plain_errors():
-        from agents.plan import default_folder, plan_run
-        from agents.train import resume as resume_run
-        from agents.train import train as train_run
+        from agents.training.run_settings import default_folder, plan_run
+        from agents.training.train import resume as resume_run
+        from agents.training.train import train as train_run
 
         if resume is not None:
             _check_alone(context, resume)
@@ -98,7 +98,7 @@ def train(
 
 def _check_alone(context: typer.Context, folder: Path) -> None:
     """Refuse what is given beside --resume and would make it another run."""
-    from agents.runs import load_run
+    from agents.training.run_folder import load_run
 
     run = load_run(folder)
     for name, given in context.params.items():
@@ -137,7 +137,7 @@ def tune(
 ) -> None:
     """Search hyperparameters by the validation cost; the best are STUDY/best.yaml, for --config of train."""
     with _plain_errors():
-        from agents.plan import default_folder, plan_run
+        from agents.training.run_settings import default_folder, plan_run
         from agents.tuning.search import BEST, search
 
         run = plan_run(
@@ -160,7 +160,7 @@ def bench(
 ) -> None:
     """Print how fast PPO learns with its default settings, and the environment's share of that time."""
     with _plain_errors():
-        from agents.bench import table
+        from agents.results.bench import table
 
         typer.echo(f"PPO on {env}\n{table(env, threads, rounds)}")
 
@@ -174,7 +174,7 @@ def curve(
 ) -> None:
     """Draw learning curves, a picture per environment; classical policies fly the same validation seeds as levels."""
     with _plain_errors():
-        from agents.curve import draw
+        from agents.results.curve import draw
 
         for picture in draw(runs, out, baseline, bounds):
             typer.echo(picture)
@@ -187,7 +187,7 @@ def export(
 ) -> None:
     """Write the policy that is best on validation seeds: tensors, a card with all runs' test results, an ONNX graph."""
     with _plain_errors():
-        from agents.export import export as export_runs
+        from agents.results.export import export as export_runs
 
         typer.echo(export_runs(runs, out))
 
@@ -206,7 +206,7 @@ def evaluate(
 ) -> None:
     """Fly a policy on the test seeds: mean and 95 % interval of each metric, and cost over the bound."""
     with _plain_errors():
-        from agents.evaluate import choose, score
+        from agents.results.evaluate import choose, score
 
         if allow_pickle and source.suffix == ".zip":
             typer.echo(f"warning: {source}: what it holds pickled is being run", err=True)
@@ -232,7 +232,7 @@ def report(
     """Fly learned and classical policies on the same test seeds: tables, fronts and robustness on one HTML page."""
 
     def write() -> Path:
-        from agents.report import report_models
+        from agents.results.report import report_models
         from baselines.report import Wanted
 
         wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, not fine, resume)

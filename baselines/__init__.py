@@ -1,15 +1,15 @@
 """Classical guidance and control policies, and the report about them."""
 
-from baselines.fuel import OptimalPlan, fuel_optimal, impulsive_transfer, regret
-from baselines.kalman import stationary_filter
-from baselines.registry import POLICIES, make_policy
+from baselines.controllers.registry import POLICIES, make_policy
+from baselines.design.steady_state_filter import stationary_filter
+from baselines.optimal import OptimalPlan, cost_ratio, fuel_optimal, impulsive_transfer
 
 __all__ = [
     "POLICIES",
     "OptimalPlan",
+    "cost_ratio",
     "fuel_optimal",
     "impulsive_transfer",
     "make_policy",
-    "regret",
     "stationary_filter",
 ]

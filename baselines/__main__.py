@@ -2,9 +2,9 @@
 
 import typer
 
-from baselines.commands import report, reproduce, sweep
-from baselines.picture import render
-from baselines.tuning.command import tune
+from baselines.cli import report, reproduce, sweep
+from baselines.cli_render import render
+from baselines.cli_tune import tune
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False)
 app.command()(tune)

@@ -1,11 +1,12 @@
 """Satellite formation flying as Gymnasium environments."""
 
-from formation_env.envs import ENV_IDS, FormationEnv, FormationVectorEnv, register_all
-from formation_env.orbit import Orbit
-from formation_env.propagation import propagate
-from formation_env.scenario import Scenario, load_scenario, scenario_names
+from formation_env.dynamics.propagation import propagate
+from formation_env.dynamics.spacecraft import Spacecraft
+from formation_env.envs import FormationEnv, FormationVectorEnv, register_all
+from formation_env.orbital.orbit import Orbit
 from formation_env.settings import ConfigError
-from formation_env.spacecraft import Spacecraft
+from formation_env.task.loading import ENV_IDS, load_scenario, scenario_names
+from formation_env.task.scenario import Scenario
 
 __version__ = "0.1.0"
 

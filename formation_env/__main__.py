@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from formation_env.settings import ConfigError
+from formation_env.task.variants import draw_variants
 
 app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
@@ -16,7 +17,7 @@ def bench(
     sb3: Annotated[bool, typer.Option("--sb3", help="how fast Stable-Baselines3's PPO learns, instead")] = False,
 ) -> None:
     """Print steps per second beside Gymnasium's own environments, measured in turns in this run."""
-    from formation_env import bench as benchmark
+    from formation_env.evaluation import bench as benchmark
 
     if sb3:
         raise typer.Exit(benchmark.learning())
@@ -30,7 +31,7 @@ def bench(
 @app.command()
 def scenarios() -> None:
     """List the scenarios that come with the package."""
-    from formation_env.scenario import load_scenario, scenario_names
+    from formation_env.task.loading import load_scenario, scenario_names
 
     for name in scenario_names():
         typer.echo(f"{name:26s} {load_scenario(name).title}")
@@ -39,7 +40,7 @@ def scenarios() -> None:
 @app.command()
 def check(paths: list[Path]) -> None:
     """Check scenario files: one line for each fault, and exit status 1 if there is any."""
-    from formation_env.scenario import load_scenario
+    from formation_env.task.loading import load_scenario
 
     faults = 0
     for path in paths:
@@ -49,7 +50,7 @@ def check(paths: list[Path]) -> None:
             typer.echo(error, err=True)
             faults += 1
         else:
-            drawn = f", {len(scenario.variants())} variants" if scenario.domain_randomization else ""
+            drawn = f", {len(draw_variants(scenario))} variants" if scenario.domain_randomization else ""
             typer.echo(f"{path}: {scenario.num_steps} steps of {scenario.dt_s:g} s{drawn}")
     raise typer.Exit(faults > 0)
 
@@ -57,7 +58,7 @@ def check(paths: list[Path]) -> None:
 @app.command()
 def observation() -> None:
     """Print the table of the observation's elements."""
-    from formation_env.observation import markdown_table
+    from formation_env.task.observation import markdown_table
 
     typer.echo(markdown_table())
 

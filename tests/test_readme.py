@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from formation_env import ENV_IDS, load_scenario, scenario_names
-from formation_env.observation import markdown_table
+from formation_env.task.observation import markdown_table
+from formation_env.task.variants import draw_variants
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 
@@ -35,7 +36,7 @@ def test_scenario_example_loads(tmp_path: Path) -> None:
     path.write_text(example, encoding="utf-8")
     scenario = load_scenario(path)
     assert scenario.sensor.measures == "position"
-    assert len(scenario.variants()) == 64
+    assert len(draw_variants(scenario)) == 64
 
 
 def test_everything_is_named_and_pictures_exist() -> None:

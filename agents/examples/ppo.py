@@ -18,9 +18,9 @@ from torch import Tensor, nn
 from torch.distributions import Normal
 
 import formation_env  # noqa: F401 (registers the environments)
-from agents.throttle import throttle
-from formation_env.evaluation import evaluate
-from formation_env.seeds import seeds
+from agents.policy.throttle import throttle
+from formation_env.evaluation.rollout import evaluate
+from formation_env.evaluation.seeds import seeds
 
 app = typer.Typer(add_completion=False)
 ROWS, LENGTH, BATCH, EPOCHS = 128, 128, 512, 5

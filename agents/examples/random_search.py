@@ -14,9 +14,9 @@ import typer
 from numpy.typing import NDArray
 
 import formation_env  # noqa: F401 (registers the environments)
-from agents.throttle import throttle
-from formation_env.observation import SLICES
-from formation_env.seeds import seeds
+from agents.policy.throttle import throttle
+from formation_env.evaluation.seeds import seeds
+from formation_env.task.observation import SLICES
 
 app = typer.Typer(add_completion=False)
 Env = gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]

@@ -12,11 +12,11 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from agents.features import CUT
+from agents.policy.features import CUT
+from agents.policy.throttle import thrust_of
 from agents.pretraining.recording import Recording
-from agents.throttle import thrust_of
-from formation_env.observation import LOG_RANGE, LOG_UNIT_POS_M, LOG_UNIT_VEL_M_S
-from formation_env.schedule import build_schedule, coast_matrices, column, columns, observation_layout
+from formation_env.task.observation import LOG_RANGE, LOG_UNIT_POS_M, LOG_UNIT_VEL_M_S, observation_layout
+from formation_env.task.schedule import build_schedule, coast_matrices, column, columns
 
 SMOOTH_M: Final = 1e-2
 """Errors below this are not told from zero; the root has no gradient there."""
@@ -85,7 +85,7 @@ class ModelEpisodes:
         return _norm(misses, SMOOTH_M)
 
     def _features(self, step: int, x_hat: Tensor, rest: Tensor) -> Tensor:
-        """What the network reads (rows, SIZE), as the environment and `agents.features` make it."""
+        """What the network reads (rows, SIZE), as the environment and `agents.policy.features` make it."""
         both = torch.addmm(self._offset[step], x_hat, self._both[step])
         logs = both.sign() * torch.log1p(both.abs()) / math.log1p(LOG_RANGE)
         return torch.cat([both * self._linear, logs, rest], dim=1).clamp(-CUT, CUT)

@@ -8,11 +8,11 @@ import torch
 from numpy.typing import NDArray
 from torch import Tensor, nn
 
-from agents.features import features
-from agents.throttle import thrust_of
+from agents.policy.features import features
+from agents.policy.throttle import thrust_of
 from formation_env.envs import FormationVectorEnv
-from formation_env.evaluation import Policy
-from formation_env.scenario import Scenario
+from formation_env.evaluation.rollout import Policy
+from formation_env.task.scenario import Scenario
 
 Array32 = NDArray[np.float32]
 BATCH: Final = 512

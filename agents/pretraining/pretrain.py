@@ -10,17 +10,18 @@ import numpy as np
 import torch
 from torch import nn
 
-from agents.actor import Actor, Functions
-from agents.models import ACTIVATIONS
+from agents.algorithms.models import ACTIVATIONS
+from agents.hyperparameters import Network, Pretraining
+from agents.policy.actor import Actor, Functions
 from agents.pretraining.gradient import ModelEpisodes
 from agents.pretraining.imitation import imitate
 from agents.pretraining.recording import record_disturbances
-from agents.settings import Network, Pretraining
 from baselines import make_policy
-from formation_env.evaluation import evaluate
-from formation_env.observation import SIZE
-from formation_env.scenario import Scenario
-from formation_env.seeds import seeds
+from formation_env.evaluation.rollout import evaluate
+from formation_env.evaluation.seeds import seeds
+from formation_env.task.observation import SIZE
+from formation_env.task.scenario import Scenario
+from formation_env.task.variants import draw_variants
 
 UPDATES_A_JUDGEMENT: Final = 50
 """After so many the network flies the validation seeds; the best one is kept."""
@@ -81,7 +82,7 @@ def pretrain(
 
 def _models(how: Pretraining, functions: Functions, scenario: Scenario, recorded: range) -> list[ModelEpisodes]:
     """Recorded episodes, evenly shared among the scenario's variants."""
-    variants = scenario.variants()[: how.episodes]
+    variants = draw_variants(scenario)[: how.episodes]
     return [
         ModelEpisodes(record_disturbances(variant, recorded[k :: len(variants)]), functions.magnification)
         for k, variant in enumerate(variants)

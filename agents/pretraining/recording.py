@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.features import REST
+from agents.policy.features import REST
 from formation_env.dynamics import NONLINEAR
-from formation_env.dynamics.base import Array
 from formation_env.envs import FormationVectorEnv
-from formation_env.observation import SIZE
-from formation_env.scenario import Scenario
+from formation_env.numerics.arrays import Array
 from formation_env.settings import ConfigError
+from formation_env.task.observation import SIZE
+from formation_env.task.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def record_disturbances(scenario: Scenario, seeds: Sequence[int]) -> Recording:
         raise ConfigError("pretraining: the gradient through the model needs a linear truth; set updates: 0")
     if scenario.domain_randomization is not None:
         raise ConfigError(
-            "domain_randomization: an episode is recorded of one variant; give one of scenario.variants()"
+            "domain_randomization: an episode is recorded of one variant; give one of draw_variants(scenario)"
         )
     env, steps, rows = FormationVectorEnv(len(seeds), scenario), scenario.num_steps, len(seeds)
     states, errors = np.empty((steps + 1, rows, 6)), np.empty((steps, rows, 6))

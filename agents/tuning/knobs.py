@@ -3,7 +3,7 @@
 from dataclasses import asdict
 from typing import Final
 
-from agents.settings import SETTINGS, AgentSettings, Algorithm
+from agents.hyperparameters import SETTINGS, AgentSettings, Algorithm
 from baselines.tuning.knobs import Knob, read, turn
 from formation_env.settings import build
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from agents.runs import Run, read_curve, start_file
-from agents.settings import AgentSettings
-from agents.train import pretrained, train
+from agents.hyperparameters import AgentSettings
+from agents.training.run_folder import Run, read_curve, start_file
+from agents.training.train import pretrained, train
 from agents.tuning.knobs import KNOBS, present, turned
 from baselines.tuning.gain_file import commented
 from baselines.tuning.study import distributions, open_study

@@ -7,11 +7,11 @@ import pandas as pd
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from baselines.experiments.statistics import Results
 from baselines.report import style
-from baselines.report.results import Results
 from baselines.report.score_figures import Looks
-from formation_env.scenario import Scenario
-from formation_env.schedule import legs
+from formation_env.task.scenario import Scenario
+from formation_env.task.schedule import legs
 
 ROWS = ("error, m", "thrust, mm/s²", "Δv so far, m/s")
 _THRUST = ["ax_m_s2", "ay_m_s2", "az_m_s2"]

@@ -8,7 +8,7 @@ from markupsafe import Markup
 from plotly.graph_objects import Figure
 from plotly.offline import get_plotlyjs
 
-_LOADER = jinja2.ChoiceLoader([jinja2.PackageLoader("baselines.report"), jinja2.PackageLoader("baselines.sweep")])
+_LOADER = jinja2.PackageLoader("baselines.report")
 
 
 def render(template: str, content: dict[str, Any]) -> str:

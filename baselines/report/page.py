@@ -2,16 +2,16 @@
 
 from typing import Any
 
+from baselines.experiments.statistics import Results, significant
+from baselines.experiments.sweep import Sweep
 from baselines.report import html
 from baselines.report.flight_figures import time_figure
-from baselines.report.results import Results, significant
 from baselines.report.scene_figure import scene_figure
 from baselines.report.score_figures import Looks, cost_figure, trade_figure
+from baselines.report.sweep_figures import looks_of
+from baselines.report.sweep_section import section
 from baselines.report.words import duration, fewer, headline, number, numbers, reading
-from baselines.sweep.figures import looks_of
-from baselines.sweep.flights import Sweep
-from baselines.sweep.report_section import section
-from formation_env.metrics import METRICS
+from formation_env.kernel.metrics import METRICS
 
 # Metric: heading, unit, factor.
 COLUMNS: dict[str, tuple[str, str, float]] = {
@@ -34,7 +34,7 @@ def render(results: list[Results], sweep: Sweep, data: dict[str, Any]) -> str:
     Args:
         results: what to show.
         sweep: fronts and robustness.
-        data: the report as data (`baselines.report.document`).
+        data: the report as data (`baselines.report.json_document`).
     """
     policies = list(dict.fromkeys(name for item in results for name in item.flown.episodes))
     looks = looks_of(policies)
@@ -121,7 +121,7 @@ def _row(results: Results, name: str) -> dict[str, Any]:
         low, high = ends if factor > 0 else ends[::-1]
         best = metric not in _NEVER_BEST and name in results.best_of(metric)
         cells.append({"mean": mean, "low": low, "high": high, "best": best})
-    ratio = numbers(results.regrets[name]) if results.regrets else None
+    ratio = numbers(results.cost_ratios[name]) if results.cost_ratios else None
     return {
         "policy": name,
         "best": name == results.best,
@@ -129,7 +129,7 @@ def _row(results: Results, name: str) -> dict[str, Any]:
         "versus": _versus(results, name),
         "episodes": results.count(name),
         "action_time": duration(results.flown.action_time_us(name)),
-        "regret": ratio and dict(zip(("mean", "low", "high"), ratio, strict=True)),
+        "cost_ratio": ratio and dict(zip(("mean", "low", "high"), ratio, strict=True)),
     }
 
 

@@ -3,12 +3,12 @@
 import numpy as np
 import plotly.graph_objects as go
 
+from baselines.experiments.statistics import Results
 from baselines.report import style
 from baselines.report.flight_figures import formation_name
-from baselines.report.results import Results
 from baselines.report.score_figures import Looks
-from formation_env.scenario import Scenario
-from formation_env.schedule import leg_reference, legs
+from formation_env.task.scenario import Scenario
+from formation_env.task.schedule import leg_reference, legs
 
 AXES = {"x": "radial x, km", "y": "along-track y, km", "z": "cross-track z, km"}
 _LEAST_SIDE = 0.3

@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
+from baselines.experiments.statistics import Interval, Results
 from baselines.report import style
-from baselines.report.results import Interval, Results
 from baselines.report.scales import Scale, round_values, view_buttons, without_zeros
 from baselines.report.style import Look
 from baselines.report.words import number
-from formation_env.scenario import Reward
+from formation_env.task.scenario import Reward
 
 Looks = dict[str, Look]
 _HEIGHT = 400

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from baselines.report.results import Results
+from baselines.experiments.statistics import Results
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,16 @@ import math
 
 import numpy as np
 
-from baselines.registry import POLICIES
-from baselines.report.results import Interval, Results, significant
+from baselines.controllers.registry import POLICIES
+from baselines.experiments.statistics import Interval, Results, significant
 
 
 def headline(results: Results) -> str:
     """Who wins an environment and by how much, in one sentence."""
     best = results.best
     parts = [f"{best} wins at {numbers(results.cost(best))[0]} m/s"]
-    if results.regrets:
-        ratio, low, high = numbers(results.regrets[best])
+    if results.cost_ratios:
+        ratio, low, high = numbers(results.cost_ratios[best])
         parts.append(f"{ratio} [{low}, {high}] times the bound")
     parts.append(f"{duration(results.flown.action_time_us(best))} per action")
     rest = [_rival(results, name, role) for role, name in _rivals(results)]
@@ -52,7 +52,7 @@ def reading(results: Results) -> list[str]:
     ]
     if len(results.ranking) > 1:
         lines.append(_comparison(results, results.ranking[1]))
-    if results.regrets:
+    if results.cost_ratios:
         lines.append(_against_bound(results))
     lost = [
         f"{name} in {count} of {results.count(name)}"
@@ -67,7 +67,7 @@ def reading(results: Results) -> list[str]:
 def _against_bound(results: Results) -> str:
     """The best policy against what was possible."""
     assert results.bounds is not None
-    ratio, low, high = numbers(results.regrets[results.best])
+    ratio, low, high = numbers(results.cost_ratios[results.best])
     return (
         f"Had everything been known beforehand, {number(float(results.bounds.mean()))} m/s would have been enough: "
         f"{results.best} costs {ratio} times the bound of each seed (95 % interval {low} to {high})."

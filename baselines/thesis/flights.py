@@ -7,14 +7,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.guidance import Guide, desired_states
-from baselines.side_by_side import SideBySide
-from formation_env.dynamics.base import Array
+from baselines.design.guidance import Guide, desired_states
+from baselines.experiments.policy_batch import SideBySide
 from formation_env.envs import interface
 from formation_env.envs.vector import FormationVectorEnv
-from formation_env.evaluation import Policy
-from formation_env.scenario import Scenario
-from formation_env.schedule import legs
+from formation_env.evaluation.rollout import Policy
+from formation_env.numerics.arrays import Array
+from formation_env.task.scenario import Scenario
+from formation_env.task.schedule import legs
 
 Floats = NDArray[np.float32]
 
@@ -134,7 +134,7 @@ def fly(
         policies: what chooses the actions.
         scenario: what is flown.
         seeds: one per episode, the same for all policies.
-        guide: the desired path that errors are measured from, see `baselines.guidance`.
+        guide: the desired path that errors are measured from, see `baselines.design.guidance`.
         every: steps between kept instants; sums and maxima are exact all the same.
         few: seeds of each policy, the first ones, whose states are kept.
         measured: whether their measurements are kept, too.

@@ -1,4 +1,4 @@
-"""Flights as data: what to fly is a table of `Job`s, for `baselines.jobs`."""
+"""Flights as data: what to fly is a table of `Job`s, for `baselines.experiments.parallel`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,11 +6,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from baselines.guidance import Guide
-from baselines.policy import AccelerationPolicy
+from baselines.controllers.policy import AccelerationPolicy
+from baselines.design.guidance import Guide
 from baselines.thesis import scenarios
 from baselines.thesis.flights import FEW, Flights, fly
-from formation_env.scenario import Scenario
+from formation_env.task.scenario import Scenario
 
 _ENVIRONMENT_COST: Final = 2
 """Time of a batch's step, in steps of one law."""

@@ -12,7 +12,7 @@ from typing import Final
 from baselines.thesis import scenarios
 from baselines.thesis.jobs import Job, Law
 from formation_env.formations import ProjectedCircle
-from formation_env.scenario import Scenario
+from formation_env.task.scenario import Scenario
 
 DYNAMICS: Final = "printed_hcw"
 """Of every flight with noise that does not say otherwise."""

@@ -7,15 +7,17 @@ from typing import Any, Final
 
 from tqdm import tqdm
 
-from baselines import jobs
-from baselines.report.document import versions
-from baselines.thesis import claims, plan, report_models, tables
-from baselines.thesis.claims_flights import Effort
+from baselines.experiments import parallel
+from baselines.report.json_document import versions
+from baselines.thesis import plan, tables
+from baselines.thesis.claims import table
+from baselines.thesis.claims.flights import Effort
 from baselines.thesis.figures import FIGURES, Figure, style
 from baselines.thesis.flights import Flights
+from baselines.thesis.models import report
 from baselines.thesis.report_page import Content, Picture, Table, render
+from formation_env.evaluation.seeds import seeds
 from formation_env.files import write_files
-from formation_env.seeds import seeds
 
 PAGE: Final = "thesis.html"
 READINGS_TEXT: Final = (
@@ -71,28 +73,28 @@ def write_thesis(out: Path, wanted: Wanted, command: str, workers: int) -> Path:
         ValueError: too many episodes.
         OSError: the folder cannot be written; nothing in it has changed then.
     """
-    work: dict[str, jobs.Work] = dict(plan.jobs(seeds("test", wanted.episodes), wanted.step_s, wanted.periods))
+    work: dict[str, parallel.Work] = dict(plan.jobs(seeds("test", wanted.episodes), wanted.step_s, wanted.periods))
     if wanted.claims:
-        work |= claims.jobs(wanted.effort)
+        work |= table.jobs(wanted.effort)
     if wanted.models:
-        work |= report_models.jobs(seeds("test", wanted.episodes))
-    flown = jobs.fly(work, workers)
+        work |= report.jobs(seeds("test", wanted.episodes))
+    flown = parallel.fly(work, workers)
     contents: dict[str, bytes] = {}
     with style.settings():
         bar = tqdm(FIGURES.items(), desc="drawing", unit="figure", dynamic_ncols=True)
         pictures = [_draw(number, figure, flown, contents) for number, figure in bar]
         content = Content(pictures)
         if wanted.models:
-            content = report_models.shown(content, report_models.found(flown), contents)
+            content = report.shown(content, report.found(flown), contents)
     if wanted.claims:
-        content = judged(content, claims.tables(flown, wanted.effort), contents)
+        content = judged(content, table.tables(flown, wanted.effort), contents)
     facts = {"episodes": wanted.episodes, "step_s": f"{wanted.step_s:g}", "command": command, "versions": versions()}
     contents[PAGE] = render(content, facts).encode()
     write_files(out, contents)
     return out / PAGE
 
 
-def judged(content: Content, found: claims.Tables, contents: dict[str, bytes]) -> Content:
+def judged(content: Content, found: table.Tables, contents: dict[str, bytes]) -> Content:
     """The page's content with the claims, whose files are added to the folder's contents."""
     below = (
         Table("readings", "Readings of section 5.2.2", READINGS_TEXT, found.readings),

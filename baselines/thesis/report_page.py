@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from baselines.report.words import number
-from baselines.thesis.claim import Claim, Verdict
+from baselines.thesis.claims.claim import Claim, Verdict
 
 
 @dataclass(frozen=True)

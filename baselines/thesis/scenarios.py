@@ -10,16 +10,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from baselines.lqr import LQRSettings
-from baselines.lqr_tracking import LQRTrackingSettings
-from baselines.policy import AccelerationPolicy
-from baselines.registry import make_policy, read_gains
-from baselines.weights import Weights
+from baselines.controllers.lqr import LQRSettings
+from baselines.controllers.lqr_tracking import LQRTrackingSettings
+from baselines.controllers.policy import AccelerationPolicy
+from baselines.controllers.registry import make_policy, read_gains
+from baselines.controllers.weights import Weights
 from formation_env.dropout import NoDropout
 from formation_env.dropout.windows import Window, Windows
-from formation_env.dynamics.base import Array
 from formation_env.formations import Following, ProjectedCircle
-from formation_env.scenario import Phase, Scenario, config_folder, load_scenario
+from formation_env.numerics.arrays import Array
+from formation_env.task.loading import config_folder, load_scenario
+from formation_env.task.scenario import Phase, Scenario
 
 ENTRY: Final = ProjectedCircle(x0_m=0.0, vx0_m_s=1.8)
 """The orbit that section 5.2.4 enters at [0, 3324, 0, 1.8, 0, 3.6]."""

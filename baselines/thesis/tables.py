@@ -6,7 +6,7 @@ from dataclasses import asdict, fields
 
 import pandas as pd
 
-from baselines.thesis.claim import Claim
+from baselines.thesis.claims.claim import Claim
 
 
 def to_csv(claims: Sequence[Claim]) -> str:

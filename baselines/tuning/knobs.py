@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from baselines.registry import read_gains
-from formation_env.scenario import Scenario, config_folder
+from baselines.controllers.registry import read_gains
 from formation_env.settings import load_yaml
+from formation_env.task.loading import config_folder
+from formation_env.task.scenario import Scenario
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from baselines.registry import make_policy
-from baselines.side_by_side import SideBySide
+from baselines.controllers.registry import make_policy
+from baselines.experiments.policy_batch import SideBySide
 from baselines.tuning.knobs import Knob, read, turn
-from formation_env.dynamics.base import Array
-from formation_env.evaluation import MAX_ROWS, Policy, evaluate
-from formation_env.scenario import Scenario
+from formation_env.evaluation.rollout import MAX_ROWS, Policy, evaluate
+from formation_env.numerics.arrays import Array
 from formation_env.settings import ConfigError
+from formation_env.task.scenario import Scenario
 
 if TYPE_CHECKING:
     from optuna import Study

@@ -3,7 +3,7 @@
 from typing import Literal
 
 from formation_env.dropout.base import Dropout, LinkChain
-from formation_env.orbit import Orbit
+from formation_env.orbital.orbit import Orbit
 from formation_env.settings import Positive, settings
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_env.dropout.base import Dropout
-from formation_env.dynamics.base import Array
+from formation_env.numerics.arrays import Array
 from formation_env.settings import NonNegative, Positive, settings
 
 

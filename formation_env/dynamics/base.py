@@ -8,13 +8,12 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import expm
 
-from formation_env.orbit import Orbit
-from formation_env.spacecraft import Spacecraft
-
-Array = NDArray[np.float64]
+from formation_env.dynamics.spacecraft import Spacecraft
+from formation_env.numerics.arrays import Array
+from formation_env.orbital.orbit import Orbit
 
 IN_PLANE = np.array([0, 1, 3, 4])
 CROSS_TRACK = np.array([2, 5])

@@ -3,9 +3,10 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from formation_env.dynamics.base import Array, Dynamics
-from formation_env.orbit import Orbit
-from formation_env.spacecraft import Spacecraft
+from formation_env.dynamics.base import Dynamics
+from formation_env.dynamics.spacecraft import Spacecraft
+from formation_env.numerics.arrays import Array
+from formation_env.orbital.orbit import Orbit
 
 
 class HCW(Dynamics):

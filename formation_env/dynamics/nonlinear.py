@@ -15,15 +15,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from formation_env import forces
-from formation_env.atmosphere import exponential_density_kg_m3
-from formation_env.constants import MU_MOON, MU_SUN, R_EARTH
-from formation_env.dynamics.base import Array
-from formation_env.elements import to_cartesian
-from formation_env.frames import eci_to_lvlh, lvlh_axes, lvlh_frame, lvlh_to_eci
-from formation_env.orbit import Orbit
-from formation_env.perturbations import Perturbations
-from formation_env.spacecraft import Spacecraft
+from formation_env.dynamics.perturbations import Perturbations
+from formation_env.dynamics.spacecraft import Spacecraft
+from formation_env.numerics.arrays import Array
+from formation_env.orbital import accelerations
+from formation_env.orbital.atmosphere import exponential_density_kg_m3
+from formation_env.orbital.constants import MU_MOON, MU_SUN, R_EARTH
+from formation_env.orbital.elements import to_cartesian
+from formation_env.orbital.frames import eci_to_lvlh, lvlh_axes, lvlh_frame, lvlh_to_eci
+from formation_env.orbital.orbit import Orbit
 
 TOLERANCE: Final = 1e-12
 """Relative error of the leader's path per step of its integration."""
@@ -59,7 +59,7 @@ class World:
 
     def sun_and_moon(self, times_s: Any) -> tuple[Array, Array]:
         """Their positions (..., 3) at times (...), m."""
-        from formation_env.ephemeris import moon_position_m, sun_position_m  # ERFA is slow to import
+        from formation_env.orbital.ephemeris import moon_position_m, sun_position_m  # ERFA is slow to import
 
         epoch = self.perturbations.epoch_jd
         return sun_position_m(epoch, times_s), moon_position_m(epoch, times_s)
@@ -74,16 +74,16 @@ class World:
             craft: its drag and its area.
         """
         (x, y, z), (vx, vy, vz), on = np.moveaxis(position, -1, 0), np.moveaxis(velocity, -1, 0), self.perturbations
-        parts = [forces.gravity(x, y, z, self.orbit.j2_coefficient)]
+        parts = [accelerations.gravity(x, y, z, self.orbit.j2_coefficient)]
         if on.drag:
             density = self.density_kg_m3(position, craft)
-            parts.append(forces.drag(vx, vy, vz, density, craft.drag_area_per_mass_m2_kg))
+            parts.append(accelerations.drag(vx, vy, vz, density, craft.drag_area_per_mass_m2_kg))
         if on.far_bodies:
             (sx, sy, sz), (mx, my, mz) = (np.moveaxis(body, -1, 0) for body in self.sun_and_moon(times_s))
-            parts.append(forces.third_body(x, y, z, sx, sy, sz, MU_SUN * on.sun))
-            parts.append(forces.third_body(x, y, z, mx, my, mz, MU_MOON * on.moon))
+            parts.append(accelerations.third_body(x, y, z, sx, sy, sz, MU_SUN * on.sun))
+            parts.append(accelerations.third_body(x, y, z, mx, my, mz, MU_MOON * on.moon))
             area = craft.radiation_area_per_mass_m2_kg * on.radiation_pressure
-            parts.append(forces.radiation_pressure(x, y, z, sx, sy, sz, area))
+            parts.append(accelerations.radiation_pressure(x, y, z, sx, sy, sz, area))
         return np.moveaxis(np.array(parts).sum(axis=0), 0, -1)
 
 

@@ -4,11 +4,11 @@ import math
 
 from numpy.typing import ArrayLike
 
-from formation_env.constants import R_EARTH
-from formation_env.dynamics.base import Array
 from formation_env.dynamics.modified_hcw import ModifiedHCW
-from formation_env.orbit import Orbit
-from formation_env.spacecraft import Spacecraft
+from formation_env.dynamics.spacecraft import Spacecraft
+from formation_env.numerics.arrays import Array
+from formation_env.orbital.constants import R_EARTH
+from formation_env.orbital.orbit import Orbit
 
 
 class PrintedHCW(ModifiedHCW):

@@ -7,9 +7,10 @@ theta' = k2 rho^2.
 import numpy as np
 from numpy.typing import ArrayLike
 
-from formation_env.dynamics.base import Array, DiscreteModel, Dynamics, control_matrix
-from formation_env.orbit import Orbit
-from formation_env.spacecraft import Spacecraft
+from formation_env.dynamics.base import DiscreteModel, Dynamics, control_matrix
+from formation_env.dynamics.spacecraft import Spacecraft
+from formation_env.numerics.arrays import Array
+from formation_env.orbital.orbit import Orbit
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 """Quadrature of the input matrix: exact to rounding for steps up to a tenth of the orbit."""

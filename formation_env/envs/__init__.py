@@ -1,19 +1,10 @@
 """The environments: two faces of one simulation, and their registration."""
 
-from typing import Final
-
 import gymnasium
 
 from formation_env.envs.single import FormationEnv
 from formation_env.envs.vector import FormationVectorEnv
-
-ENV_IDS: Final = {
-    "FormationInitialization-v0": "initialization",
-    "FormationKeeping-v0": "keeping",
-    "FormationReconfiguration-v0": "reconfiguration",
-    "FormationMission-v0": "mission",
-}
-"""Registered ids and their scenarios."""
+from formation_env.task.loading import ENV_IDS
 
 
 def register_all() -> None:

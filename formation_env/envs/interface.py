@@ -9,26 +9,26 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from formation_env import observation
-from formation_env.dynamics.base import Array
-from formation_env.kernel import tile as f
+from formation_env.kernel import tile as field
 from formation_env.kernel.simulation import Simulation
-from formation_env.scenario import Scenario
+from formation_env.numerics.arrays import Array
+from formation_env.task import observation
+from formation_env.task.scenario import Scenario
 
-INFO_STATES: Final = {"true_state": (f.TRUTH, 6), "estimate": (f.ESTIMATE, 6)}
+INFO_STATES: Final = {"true_state": (field.TRUTH, 6), "estimate": (field.ESTIMATE, 6)}
 """Info key: first state field, size."""
 INFO_THRUST: Final = "accel_m_s2"
 INFO_SCALARS: Final[dict[str, tuple[int, type]]] = {
-    "position_error_m": (f.POSITION_ERROR, float),
-    "delta_v_m_s": (f.DELTA_V, float),
-    "error_cost_m_s": (f.ERROR_COST, float),
-    "exit_cost_m_s": (f.EXIT_COST, float),
-    "nis": (f.NIS, float),
-    "measured": (f.MEASURED, bool),
-    "phase": (f.PHASE, int),
+    "position_error_m": (field.POSITION_ERROR, float),
+    "delta_v_m_s": (field.DELTA_V, float),
+    "error_cost_m_s": (field.ERROR_COST, float),
+    "exit_cost_m_s": (field.EXIT_COST, float),
+    "nis": (field.NIS, float),
+    "measured": (field.MEASURED, bool),
+    "phase": (field.PHASE, int),
 }
 """Info key: result field, type."""
-INFO_VARIANT: Final = {"variant": (f.VARIANT, int)}
+INFO_VARIANT: Final = {"variant": (field.VARIANT, int)}
 """The same, of scenarios with domain randomization."""
 _Float32Space = spaces.Space[NDArray[np.float32]]
 TOTALS: Final = "episode_totals"
@@ -41,7 +41,7 @@ def action_space() -> spaces.Space[NDArray[np.float32]]:
 
 
 def observation_space() -> spaces.Space[NDArray[np.float32]]:
-    """See `formation_env.observation`."""
+    """See `formation_env.task.observation`."""
     return cast(_Float32Space, spaces.Box(-observation.BOUND, observation.BOUND, (observation.SIZE,), np.float32))
 
 

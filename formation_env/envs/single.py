@@ -9,16 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_env.envs import interface
-from formation_env.jit import LANES
-from formation_env.kernel import tile as f
+from formation_env.kernel import tile as field
+from formation_env.kernel.metrics import episode_metrics
 from formation_env.kernel.simulation import Simulation
-from formation_env.metrics import episode_metrics
-from formation_env.scenario import Scenario, load_scenario
+from formation_env.numerics.jit import LANES
+from formation_env.rendering.modes import FRAMES_PER_S, RENDER_MODES
+from formation_env.task.loading import load_scenario
+from formation_env.task.scenario import Scenario
 
 Observation = NDArray[np.float32]
 
 _REWARD, _TERMINATED, _TRUNCATED, _THRUST = (
-    (field - f.RESULTS) // LANES for field in (f.REWARD, f.TERMINATED, f.TRUNCATED, f.THRUST)
+    (offset - field.RESULTS) // LANES for offset in (field.REWARD, field.TERMINATED, field.TRUNCATED, field.THRUST)
 )
 _ONLY_ROW = np.zeros(1, np.intp)
 
@@ -26,11 +28,13 @@ _ONLY_ROW = np.zeros(1, np.intp)
 class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     """A follower that flies a scenario around its leader.
 
-    Observation: see `formation_env.observation`. Action: LVLH acceleration in units of the scenario's max_accel_m_s2.
-    Reward: see `formation_env.scenario.Reward`. Truncated at the end of the plan; terminated beyond a limit.
+    Observation: see `formation_env.task.observation`. Action: LVLH acceleration in units of the scenario's
+    max_accel_m_s2. Reward: see `formation_env.task.scenario.Reward`.
+
+    Truncated at the end of the plan; terminated beyond a limit.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 20}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FRAMES_PER_S}  # noqa: RUF012
 
     def __init__(self, scenario: str | Path | Scenario = "keeping", render_mode: str | None = None) -> None:
         """Make the environment.
@@ -108,11 +112,11 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _info(self, values: list[float]) -> dict[str, Any]:
         """Info of the last step, from the results (fields,) of the one row."""
         info: dict[str, Any] = {
-            name: self.simulation.row_state(field, size) for name, (field, size) in interface.INFO_STATES.items()
+            name: self.simulation.row_state(offset, size) for name, (offset, size) in interface.INFO_STATES.items()
         }
         info[interface.INFO_THRUST] = np.array(values[_THRUST : _THRUST + 3])
-        for name, (field, kind) in self._info_scalars.items():
-            info[name] = kind(values[(field - f.RESULTS) // LANES])
+        for name, (offset, kind) in self._info_scalars.items():
+            info[name] = kind(values[(offset - field.RESULTS) // LANES])
         return info
 
     def render(self) -> Any:
@@ -121,7 +125,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             gymnasium.logger.warn("render: make the environment with render_mode='rgb_array' or 'human' first")
             return None
         if self._renderer is None:
-            from formation_env.rendering import Renderer
+            from formation_env.rendering.renderer import Renderer
 
             self._renderer = Renderer(self.scenario, self.render_mode)
         return self._renderer.draw(self.simulation)

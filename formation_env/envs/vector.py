@@ -11,10 +11,11 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from formation_env.envs import interface
-from formation_env.kernel import tile as f
+from formation_env.kernel import tile as field
+from formation_env.kernel.metrics import episode_metrics
 from formation_env.kernel.simulation import Rows, Simulation
-from formation_env.metrics import episode_metrics
-from formation_env.scenario import Scenario, load_scenario
+from formation_env.task.loading import load_scenario
+from formation_env.task.scenario import Scenario
 
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
@@ -125,9 +126,9 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         simulation = self.simulation
         simulation.actions[:] = actions
         simulation.step(self._observations)
-        rewards = simulation.result(f.REWARD).copy()
-        terminations = simulation.result(f.TERMINATED) > 0.5
-        truncations = simulation.result(f.TRUNCATED) > 0.5
+        rewards = simulation.result(field.REWARD).copy()
+        terminations = simulation.result(field.TERMINATED) > 0.5
+        truncations = simulation.result(field.TRUNCATED) > 0.5
         ended = np.flatnonzero(terminations | truncations)
         finals = self._begin_next(ended) if len(ended) else {}
         return self._observations.copy(), rewards, terminations, truncations, {**self._infos(), **finals}
@@ -149,11 +150,11 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         """Infos of some rows of the last step, in Gymnasium's form."""
         simulation = self.simulation
         infos: dict[str, Any] = {
-            name: simulation.state(field, size, rows) for name, (field, size) in interface.INFO_STATES.items()
+            name: simulation.state(offset, size, rows) for name, (offset, size) in interface.INFO_STATES.items()
         }
-        infos[interface.INFO_THRUST] = simulation.result_vector(f.THRUST, 3, rows)
-        for name, (field, kind) in self._info_scalars.items():
-            infos[name] = simulation.result(field, rows).astype(kind)
+        infos[interface.INFO_THRUST] = simulation.result_vector(field.THRUST, 3, rows)
+        for name, (offset, kind) in self._info_scalars.items():
+            infos[name] = simulation.result(offset, rows).astype(kind)
         return self._spread(infos, rows)
 
     def _spread(self, values: dict[str, Any], rows: Rows) -> dict[str, Any]:

@@ -5,11 +5,11 @@ from abc import ABC, abstractmethod
 import numpy as np
 from numpy.typing import ArrayLike
 
-from formation_env.constants import MU_EARTH
-from formation_env.dynamics.base import Array
 from formation_env.dynamics.hcw import transition_matrix
 from formation_env.dynamics.yamanaka_ankersen import transition_matrix as elliptic_transition_matrix
-from formation_env.orbit import Orbit
+from formation_env.numerics.arrays import Array
+from formation_env.orbital.constants import MU_EARTH
+from formation_env.orbital.orbit import Orbit
 
 
 class Formation(ABC):

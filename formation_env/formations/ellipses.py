@@ -3,9 +3,9 @@
 import math
 from typing import Literal
 
-from formation_env.dynamics.base import Array
 from formation_env.formations.base import Formation, closed_ellipse
-from formation_env.orbit import Orbit
+from formation_env.numerics.arrays import Array
+from formation_env.orbital.orbit import Orbit
 from formation_env.settings import Real, settings
 
 

@@ -5,10 +5,10 @@ from typing import Literal
 
 import numpy as np
 
-from formation_env.constants import OMEGA_EARTH
-from formation_env.dynamics.base import Array
 from formation_env.formations.base import Formation, need_circle
-from formation_env.orbit import Orbit
+from formation_env.numerics.arrays import Array
+from formation_env.orbital.constants import OMEGA_EARTH
+from formation_env.orbital.orbit import Orbit
 from formation_env.settings import Real, settings
 
 

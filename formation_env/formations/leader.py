@@ -4,9 +4,9 @@ from typing import Literal
 
 import numpy as np
 
-from formation_env.dynamics.base import Array
 from formation_env.formations.base import Formation
-from formation_env.orbit import Orbit
+from formation_env.numerics.arrays import Array
+from formation_env.orbital.orbit import Orbit
 from formation_env.settings import settings
 
 

@@ -9,12 +9,14 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from formation_env.dynamics import NONLINEAR, DiscreteModel
-from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, Array
+from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE
 from formation_env.dynamics.nonlinear import leader_table, substeps
-from formation_env.estimation import process_noise_covariance, upper_triangle
-from formation_env.jit import lane, spaced
-from formation_env.scenario import Scenario
-from formation_env.schedule import build_schedule, observation_layout
+from formation_env.navigation.filter_settings import process_noise_covariance, upper_triangle
+from formation_env.numerics.arrays import Array
+from formation_env.numerics.jit import inline_scalar, spaced
+from formation_env.task.observation import observation_layout
+from formation_env.task.scenario import Scenario
+from formation_env.task.schedule import build_schedule
 
 # What the true motion is made of, and the filter's: compile-time constants.
 CONSTANT_MODEL: Final = 0
@@ -167,14 +169,14 @@ def step_table(scenario: Scenario) -> Array:
     return np.hstack([plan, *(np.vstack([part[:1], part]) for part in columns)])
 
 
-@lane
+@inline_scalar
 def unpack(s: Array) -> tuple[Model, Model, ProcessNoise, SensorNoise, Forces, Scalars]:
     """The settings as tuples of scalars, so that the compiler need not read memory to know them."""
     truth, belief, process = unpack_model(s, 0, 1), unpack_model(s, BELIEF, 1), unpack_process(s, BELIEF, 1)
     return truth, belief, process, unpack_sensor(s, 0, 1), unpack_forces(s, 0, 1), unpack_scalars(s, 0, 1)
 
 
-@lane
+@inline_scalar
 def unpack_model(s: Array, first: int, step: int) -> Model:
     """A model from its MODEL_SIZE numbers.
 
@@ -193,27 +195,27 @@ def unpack_model(s: Array, first: int, step: int) -> Model:
     )
 
 
-@lane
+@inline_scalar
 def unpack_process(s: Array, first: int, step: int) -> ProcessNoise:
     """The process noise behind the filter's model, which is at `first`."""
     first += MODEL_SIZE * step
     return ProcessNoise(spaced(s, first, step, 10), spaced(s, first + 10 * step, step, 3))
 
 
-@lane
+@inline_scalar
 def unpack_sensor(s: Array, first: int, step: int) -> SensorNoise:
     """The sensor out of all settings, which begin at `first`."""
     first += _SENSOR * step
     return SensorNoise(spaced(s, first, step, 2), spaced(s, first + 2 * step, step, 2))
 
 
-@lane
+@inline_scalar
 def unpack_forces(s: Array, first: int, step: int) -> Forces:
     """The forces out of all settings, which begin at `first`."""
     return Forces(*spaced(s, first + _FORCES * step, step, FORCES_SIZE))
 
 
-@lane
+@inline_scalar
 def unpack_scalars(s: Array, first: int, step: int) -> Scalars:
     """The settings of one number each out of all settings, which begin at `first`."""
     return Scalars(*spaced(s, first + _SCALARS * step, step, SCALAR_SIZE))

@@ -3,15 +3,16 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_env import observation
-from formation_env.dynamics.base import Array
-from formation_env.jit import LANES
 from formation_env.kernel import packing
-from formation_env.kernel import tile as f
+from formation_env.kernel import tile as field
 from formation_env.kernel.program import program
-from formation_env.scenario import Scenario
-from formation_env.schedule import OFFSETS, WIDTH
-from formation_env.streams import stream_key
+from formation_env.numerics.arrays import Array
+from formation_env.numerics.jit import LANES
+from formation_env.numerics.random_streams import stream_key
+from formation_env.task import observation
+from formation_env.task.scenario import Scenario
+from formation_env.task.schedule import OFFSETS, WIDTH
+from formation_env.task.variants import draw_variants
 
 Rows = slice | NDArray[np.intp]
 """Some rows: a slice, or their indices."""
@@ -33,22 +34,22 @@ class Simulation:
         tiles = -(-num_rows // LANES)
         self.scenario = scenario
         self.num_rows = num_rows
-        self.variants = scenario.variants()
+        self.variants = draw_variants(scenario)
         self.schedule, self._settings = packing.pack_variants(self.variants)
         self.actions = np.zeros((num_rows, 3), np.float32)
-        self.results = np.zeros((f.NUM_RESULTS, tiles * LANES))
-        self._states = np.zeros((tiles, f.STATE_FIELDS * LANES))
-        self._scratch = np.zeros((f.TILE_FIELDS + self.schedule.shape[2] - WIDTH) * LANES)
+        self.results = np.zeros((field.NUM_RESULTS, tiles * LANES))
+        self._states = np.zeros((tiles, field.STATE_FIELDS * LANES))
+        self._scratch = np.zeros((field.TILE_FIELDS + self.schedule.shape[2] - WIDTH) * LANES)
         varied = len(self.variants) > 1
         self._program = (packing.truth_kind(scenario), packing.belief_kind(scenario), varied)
-        self._lane_set = (False,) * (1 if num_rows == 1 else LANES)
+        self._width = (False,) * (1 if num_rows == 1 else LANES)
         self._nominal_starts = np.array([flown.start.formation.state(flown.orbit) for flown in self.variants])
 
     def seed(self, row: int, generator: np.random.Generator) -> None:
         """Give a row a new random stream; its next episode is the stream's first."""
         key = stream_key(generator).view(np.float64)
-        for field, value in ((f.KEY, key[0]), (f.KEY + LANES, key[1]), (f.EPISODE, -1.0)):
-            self._states[row // LANES, field + row % LANES] = value
+        for offset, value in ((field.KEY, key[0]), (field.KEY + LANES, key[1]), (field.EPISODE, -1.0)):
+            self._states[row // LANES, offset + row % LANES] = value
 
     def reset(self, rows: NDArray[np.intp], observations: NDArray[np.float32], starts: Array | None = None) -> None:
         """Begin the next episode of some rows.
@@ -69,7 +70,7 @@ class Simulation:
             starts is not None,
             observations,
             self.results,
-            self._lane_set,
+            self._width,
         )
 
     def step(self, observations: NDArray[np.float32]) -> None:
@@ -86,7 +87,7 @@ class Simulation:
             self.actions,
             observations,
             self.results,
-            self._lane_set,
+            self._width,
         )
 
     def memory(self) -> Array:
@@ -101,13 +102,13 @@ class Simulation:
         """An array for the observations of all rows."""
         return np.empty((self.num_rows, observation.SIZE), np.float32)
 
-    def result(self, field: int, rows: Rows = slice(None)) -> Array:
+    def result(self, offset: int, rows: Rows = slice(None)) -> Array:
         """One result of the last step (rows,); a view if the rows are a slice."""
-        return self.results[(field - f.RESULTS) // LANES, : self.num_rows][rows]
+        return self.results[(offset - field.RESULTS) // LANES, : self.num_rows][rows]
 
-    def result_vector(self, field: int, size: int, rows: Rows = slice(None)) -> Array:
+    def result_vector(self, offset: int, size: int, rows: Rows = slice(None)) -> Array:
         """Copy (rows, size) of consecutive results of the last step."""
-        first = (field - f.RESULTS) // LANES
+        first = (offset - field.RESULTS) // LANES
         return self.results[first : first + size, : self.num_rows].T[rows].copy()
 
     @property
@@ -118,22 +119,22 @@ class Simulation:
 
     def variant(self, rows: Rows = slice(None)) -> NDArray[np.intp]:
         """Which of the variants rows flew in the last step, or begin (rows,)."""
-        return self.result(f.VARIANT, rows).astype(np.intp)
+        return self.result(field.VARIANT, rows).astype(np.intp)
 
     @property
     def flown(self) -> Scenario:
         """What the first row flies."""
         return self.variants[int(self.variant()[0])]
 
-    def state(self, field: int, size: int, rows: Rows = slice(None)) -> Array:
+    def state(self, offset: int, size: int, rows: Rows = slice(None)) -> Array:
         """Copy (rows, size) of consecutive state fields."""
         if isinstance(rows, slice):
-            block = self._states[:, field : field + size * LANES].reshape(-1, size, LANES)
+            block = self._states[:, offset : offset + size * LANES].reshape(-1, size, LANES)
             return block.transpose(0, 2, 1).copy().reshape(-1, size)[: self.num_rows][rows]
-        columns = field + np.arange(size) * LANES
+        columns = offset + np.arange(size) * LANES
         values: Array = self._states[(rows // LANES)[:, None], columns + (rows % LANES)[:, None]]
         return values
 
-    def row_state(self, field: int, size: int) -> Array:
+    def row_state(self, offset: int, size: int) -> Array:
         """Copy (size,) of consecutive state fields of the first row."""
-        return self._states[0, field : field + size * LANES : LANES].copy()
+        return self._states[0, offset : offset + size * LANES : LANES].copy()

@@ -6,11 +6,11 @@ The first fields are a row's state and live from step to step; the rest is scrat
 
 from typing import Final
 
-from formation_env import observation, schedule
-from formation_env.jit import LANES
 from formation_env.kernel import packing
+from formation_env.numerics.jit import LANES
+from formation_env.task import observation, schedule
 
-LaneSet = tuple[bool, ...]
+Width = tuple[bool, ...]
 """Its length says how many rows of a tile are computed."""
 
 _next_field = 0

@@ -1,6 +1,1 @@
-"""Pictures of a flight. The only package of formation_env that imports matplotlib; it is imported when first needed."""
-
-from formation_env.rendering.renderer import Renderer
-from formation_env.rendering.snapshot import save_frame
-
-__all__ = ["Renderer", "save_frame"]
+"""Pictures of a flight. Only `renderer` and what it imports need matplotlib; they are imported when first used."""

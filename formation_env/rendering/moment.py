@@ -5,12 +5,12 @@ from typing import Final
 
 import numpy as np
 
-from formation_env.dynamics.base import Array
-from formation_env.jit import LANES
-from formation_env.kernel import tile as f
+from formation_env.kernel import tile as field
 from formation_env.kernel.simulation import Simulation
-from formation_env.scenario import Scenario
-from formation_env.schedule import Leg, leg_reference, legs
+from formation_env.numerics.arrays import Array
+from formation_env.numerics.jit import LANES
+from formation_env.task.scenario import Scenario
+from formation_env.task.schedule import Leg, leg_reference, legs
 
 MARGIN: Final = 1.16
 """Half the width of the view of a plan, in half widths of the plan."""
@@ -47,19 +47,19 @@ class Moment:
 
 def read_moment(simulation: Simulation) -> Moment:
     """What the simulation's first row shows now."""
-    in_plane, z_variance = simulation.row_state(f.P_IN_PLANE, 10), simulation.row_state(f.P_CROSS_TRACK, 1)[0]
+    in_plane, z_variance = simulation.row_state(field.P_IN_PLANE, 10), simulation.row_state(field.P_CROSS_TRACK, 1)[0]
     xx, xy, yy = in_plane[[0, 1, 4]]
-    first = (f.THRUST - f.RESULTS) // LANES
+    first = (field.THRUST - field.RESULTS) // LANES
     return Moment(
-        step=int(simulation.row_state(f.STEP, 1)[0]),
-        truth=simulation.row_state(f.TRUTH, 3),
-        estimate=simulation.row_state(f.ESTIMATE, 3),
+        step=int(simulation.row_state(field.STEP, 1)[0]),
+        truth=simulation.row_state(field.TRUTH, 3),
+        estimate=simulation.row_state(field.ESTIMATE, 3),
         covariance=np.array([[xx, xy, 0], [xy, yy, 0], [0, 0, z_variance]]),
         thrust=simulation.results[first : first + 3, 0] / simulation.flown.spacecraft.max_accel_m_s2,
-        measured=bool(simulation.result(f.MEASURED)[0] > 0.5),
-        age_s=float(simulation.row_state(f.AGE, 1)[0]),
-        position_error_m=float(simulation.result(f.POSITION_ERROR)[0]),
-        delta_v_m_s=float(simulation.row_state(f.SUM_DELTA_V, 1)[0]),
+        measured=bool(simulation.result(field.MEASURED)[0] > 0.5),
+        age_s=float(simulation.row_state(field.AGE, 1)[0]),
+        position_error_m=float(simulation.result(field.POSITION_ERROR)[0]),
+        delta_v_m_s=float(simulation.row_state(field.SUM_DELTA_V, 1)[0]),
     )
 
 

@@ -7,14 +7,14 @@ import matplotlib
 import numpy as np
 from matplotlib.backends.registry import BackendFilter, backend_registry
 
-from formation_env.envs.single import FormationEnv
 from formation_env.kernel.simulation import Simulation
+from formation_env.rendering.modes import FRAMES_PER_S, RENDER_MODES
 from formation_env.rendering.moment import Moment, read_moment
 from formation_env.rendering.scene import DPI, HEIGHT_PX, WIDTH_PX, Frame, Scene
-from formation_env.scenario import Scenario
+from formation_env.task.scenario import Scenario
 
 TRAIL_PERIODS: Final = 0.5
-PAUSE_S: Final = 1 / FormationEnv.metadata["render_fps"]
+PAUSE_S: Final = 1 / FRAMES_PER_S
 
 
 class Renderer:
@@ -33,9 +33,8 @@ class Renderer:
         Raises:
             ValueError: another mode.
         """
-        modes = FormationEnv.metadata["render_modes"]
-        if render_mode not in modes:
-            raise ValueError(f"render_mode: must be one of {modes}, got {render_mode!r}")
+        if render_mode not in RENDER_MODES:
+            raise ValueError(f"render_mode: must be one of {list(RENDER_MODES)}, got {render_mode!r}")
         self._flown = scenario
         self._mode = render_mode
         self._trail: deque[Moment] = deque(maxlen=max(2, scenario.steps(TRAIL_PERIODS)))

@@ -12,11 +12,11 @@ from matplotlib.patches import Rectangle
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from formation_env.dynamics.base import Array
+from formation_env.numerics.arrays import Array
 from formation_env.rendering.moment import Moment, Plan
 from formation_env.rendering.views import GREEN, GREY, RED, STYLES, View
-from formation_env.scenario import Scenario
-from formation_env.schedule import Leg
+from formation_env.task.scenario import Scenario
+from formation_env.task.schedule import Leg
 
 Frame = NDArray[np.uint8]
 

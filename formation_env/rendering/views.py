@@ -7,7 +7,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from formation_env.dynamics.base import Array
+from formation_env.numerics.arrays import Array
 from formation_env.rendering.moment import Moment
 
 SIGMAS: Final = 3.0

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from baselines.thesis.figures import style
 from baselines.thesis.flights import Flights, whole_periods
-from formation_env.dynamics.base import Array
+from formation_env.numerics.arrays import Array
 
 PERIODS = "Time [period]"
 CONSUMPTION = "Control consumption [m/s]"

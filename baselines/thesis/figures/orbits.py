@@ -7,10 +7,10 @@ from matplotlib.figure import Figure
 from scipy.spatial.transform import Rotation
 
 from baselines.thesis.figures import paths, style
-from formation_env.constants import OMEGA_EARTH, R_EARTH
-from formation_env.dynamics.base import Array
 from formation_env.formations import Following, Formation, InTrack
-from formation_env.orbit import Orbit
+from formation_env.numerics.arrays import Array
+from formation_env.orbital.constants import OMEGA_EARTH, R_EARTH
+from formation_env.orbital.orbit import Orbit
 
 _POINTS: Final = 721
 

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from baselines.thesis.figures import style
 from baselines.thesis.flights import Flights
-from formation_env.dynamics.base import Array
-from formation_env.schedule import legs
+from formation_env.numerics.arrays import Array
+from formation_env.task.schedule import legs
 
 ERROR: Final = "Position error [m]"
 ACCEL: Final = "Control acceleration [m/s²]"

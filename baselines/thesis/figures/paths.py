@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 
 from baselines.thesis.figures import style
 from baselines.thesis.flights import Flights
-from formation_env.dynamics.base import Array
-from formation_env.schedule import legs
+from formation_env.numerics.arrays import Array
+from formation_env.task.schedule import legs
 
 MARGIN: Final = 1.08
 

@@ -1,0 +1,1 @@
+"""PPO and SAC of Stable-Baselines3, fitted to the environments."""

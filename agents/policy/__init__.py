@@ -1,0 +1,1 @@
+"""Learned policies in numpy: networks, throttle, and the library of shipped ones."""

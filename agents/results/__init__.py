@@ -1,0 +1,1 @@
+"""Evaluation, export, reports and learning curves of trained policies."""

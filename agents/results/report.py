@@ -1,0 +1,154 @@
+"""Learned policies in the classical policies' report."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from agents.policy.actor import Actor, to_bytes
+from agents.policy.library import CARD, TENSORS, Card, read_card, sha256, shipped_paths
+from agents.results.evaluate import open_policy
+from agents.results.report_table import learned_table
+from baselines.controllers.registry import POLICIES
+from baselines.experiments.policy_factories import classical
+from baselines.experiments.statistics import Results
+from baselines.report import Table, Wanted, write_report
+from formation_env.settings import ConfigError
+from formation_env.task.loading import ENV_IDS, load_scenario, scenario_names
+from formation_env.task.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Learned:
+    """A factory of learned policies: it gives the one that was trained on exactly the scenario, or none.
+
+    Attributes:
+        label: their name in the report.
+        sources: what `open_policy` takes.
+
+    Raises:
+        ConfigError: a faulty policy, or two that were trained on the same scenario.
+    """
+
+    label: str
+    sources: tuple[Path, ...]
+
+    def __post_init__(self) -> None:
+        scenarios = [_open(source).scenario for source in self.sources]
+        for index, scenario in enumerate(scenarios):
+            if scenario in scenarios[:index]:
+                raise ConfigError(f"--model: {self.label}: {self.sources[index]} was trained on what another was, too")
+
+    def __call__(self, original: Scenario, believed: Scenario) -> Actor | None:
+        """The policy for a scenario.
+
+        Args:
+            original: what it must have been trained on.
+            believed: makes no difference: it sees the observation alone.
+        """
+        return next((actor for actor in map(_open, self.sources) if actor.scenario == original), None)
+
+    def settings(self, original: Scenario) -> dict[str, Any] | None:
+        """What tells its policy for a scenario from others, as plain data; None if it has none."""
+        actor = self(original, original)
+        if actor is None:
+            return None
+        widths = [len(bias) for _, bias in actor.layers]
+        return {"layers": widths, "sha256": sha256(to_bytes(actor))} | asdict(actor.functions)
+
+
+@lru_cache
+def _open(source: Path) -> Actor:
+    """A policy, read once."""
+    return open_policy(source)
+
+
+def report_models(
+    models: Sequence[str], envs: Sequence[str] | None, wanted: Wanted, out: Path, command: str, workers: int = 1
+) -> Path:
+    """Write the report with the classical policies and learned ones.
+
+    Args:
+        models: each LABEL=PATH; policies of several scenarios may share a label. Without any, those that are shipped,
+            by their algorithms.
+        envs: registered ids, or names or paths of scenarios; by default those of the models, or the registered ones
+            and those of the shipped policies.
+        wanted: how much to fly.
+        out: folder of the report.
+        command: the command line, to be noted.
+        workers: processes to fly in.
+
+    Returns:
+        Path of the HTML page.
+
+    Raises:
+        ConfigError: a faulty model or environment, or a model that flies nowhere; one line.
+        OSError: the folder cannot be written.
+    """
+    sources = parse_models(models) if models else shipped_by_algorithm()
+    learned = {label: Learned(label, tuple(paths)) for label, paths in sources.items()}
+    flown = list(envs or dict.fromkeys((*(() if models else ENV_IDS), *envs_of(learned))))
+    if models:
+        _check_flown(learned, flown)
+    cards = {label: _cards(paths) for label, paths in sources.items()}
+
+    def tables(results: Sequence[Results]) -> list[Table]:
+        return [learned_table(results, cards)] if any(cards.values()) else []
+
+    return write_report({**classical(), **learned}, flown, wanted, out, command, workers, tables)
+
+
+def _cards(paths: Sequence[Path]) -> list[Card]:
+    """Of those policies that have one; runs' folders have none."""
+    return [read_card(path.with_suffix(CARD)) for path in paths if path.suffix == TENSORS]
+
+
+def parse_models(models: Sequence[str]) -> dict[str, list[Path]]:
+    """Paths by label.
+
+    Raises:
+        ConfigError: an item is not LABEL=PATH, or takes a classical policy's name.
+    """
+    paths: dict[str, list[Path]] = {}
+    for item in models:
+        label, equals, path = item.partition("=")
+        if not (label and equals and path):
+            raise ConfigError(f"--model: must be LABEL=PATH, got {item!r}")
+        if label in POLICIES:
+            raise ConfigError(f"--model: {label!r} is the name of a classical policy; choose another label")
+        paths.setdefault(label, []).append(Path(path))
+    return paths
+
+
+def shipped_by_algorithm() -> dict[str, list[Path]]:
+    """The shipped policies by their algorithms."""
+    paths: dict[str, list[Path]] = {}
+    for path in shipped_paths():
+        paths.setdefault(read_card(path.with_suffix(CARD)).algorithm, []).append(path)
+    return paths
+
+
+def envs_of(learned: Mapping[str, Learned]) -> list[str]:
+    """Ids, or else names, of the scenarios that policies were trained on.
+
+    Raises:
+        ConfigError: one of them has none.
+    """
+    names = {load_scenario(env): env for env in (*scenario_names(), *ENV_IDS)}
+    found = {}
+    for source in (source for factory in learned.values() for source in factory.sources):
+        scenario = _open(source).scenario
+        if scenario not in names:
+            raise ConfigError(f"--env: {source} was trained on a scenario of its own; name its file")
+        found[names[scenario]] = None
+    return list(found)
+
+
+def _check_flown(learned: Mapping[str, Learned], envs: Sequence[str]) -> None:
+    """Refuse a model that flies in none of the environments."""
+    scenarios = [load_scenario(env) for env in envs]
+    for label, factory in learned.items():
+        for source in factory.sources:
+            if _open(source).scenario not in scenarios:
+                raise ConfigError(f"--model: {label}: {source} was trained on what the report leaves out")

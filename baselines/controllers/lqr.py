@@ -1,0 +1,159 @@
+"""Linear quadratic regulator of the error state."""
+
+from functools import lru_cache
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, Strict, model_validator
+
+from baselines.controllers.policy import AccelerationPolicy
+from baselines.controllers.weights import Weights
+from baselines.design.guidance import Guidance, Guide, Tracking, desired_path
+from baselines.design.phase_tables import by_steps_left, nominal_start
+from baselines.design.reweighted_lqg import PhaseDesign, expected_cost_design
+from baselines.design.riccati import finite_horizon_gains, least_fuel_gains, stationary
+from formation_env.numerics.arrays import Array, Observations
+from formation_env.settings import Flag, NonNegative, Positive, settings
+from formation_env.task.scenario import Scenario
+from formation_env.task.schedule import Leg
+
+Rounds = Annotated[int, Strict(), Field(ge=0, le=100)]
+
+
+@settings
+class ExpectedCostSettings:
+    """How the gains of least expected cost are found, see `baselines.design.reweighted_lqg`.
+
+    Attributes:
+        rounds: how often the weights are renewed.
+        floor: smallest thrust that is told from none, in units of max_accel_m_s2.
+        price_scale: factor of the scenario's price of errors.
+    """
+
+    rounds: Rounds = 30
+    floor: Positive = 3e-4
+    price_scale: Positive = 1.0
+
+
+@settings
+class TransferSettings:
+    """How a transfer is flown.
+
+    Attributes:
+        horizon: `infinite`: one gain, the weights hold at every step. `finite`: a gain for each number of steps to
+            arrival, the state's weights hold at the arrival only (Ma 2009, eq. 4.12-4.14).
+        weights: of errors from the desired path, and of control.
+        rounds: finite horizon: how often the control's weights are renewed, towards least fuel; 0 is least energy.
+        floor: finite horizon: smallest burn that is told from none, in units of max_accel_m_s2.
+    """
+
+    horizon: Literal["finite", "infinite"] = "finite"
+    weights: Weights = Weights(velocity_s2=(1e6, 1e6, 1e6), control_s2=(1e-3, 1e-3, 1e-3))
+    rounds: Annotated[int, Strict(), Field(ge=0, le=100)] = 30
+    floor: Positive = 3e-3
+
+
+@settings
+class LQRSettings:
+    """Gains of `lqr`.
+
+    Attributes:
+        design: `expected_cost`: a gain for each step, from the scenario's own cost; `weights`: from `hold` and
+            `transfer`.
+        guidance: the desired path, see `baselines.design.guidance`; `expected_cost` finds the way by itself.
+        feedforward: whether the thrust that the desired path itself takes is added.
+        deadband: design `expected_cost`: the follower coasts while a thrust would take off less than this times itself
+            from the cost to come; 0 is none, 1 is what thrust costs.
+        expected_cost: for that design.
+        hold: weights in hold.
+        transfer: how transfers are flown.
+    """
+
+    design: Literal["expected_cost", "weights"] = "expected_cost"
+    guidance: Guide = "automatic"
+    feedforward: Flag = True
+    deadband: NonNegative = 0.0
+    expected_cost: ExpectedCostSettings = ExpectedCostSettings()
+    hold: Weights = Weights(velocity_s2=(1e5, 1e5, 1e5), control_s2=(3e5, 3e5, 3e5))
+    transfer: TransferSettings = TransferSettings()
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        if self.design == "expected_cost" and self.guidance != "automatic":
+            raise ValueError(f"guidance: must be automatic with design expected_cost, got {self.guidance!r}")
+        if self.design == "weights" and self.deadband > 0:
+            raise ValueError(f"deadband: must be 0 with design weights, whose cost has no unit, got {self.deadband:g}")
+        return self
+
+
+class LQR(AccelerationPolicy):
+    """u = -K (x_hat - x_d) + feedforward, by the filter's discrete model (Ma 2009, eq. 4.10)."""
+
+    Settings = LQRSettings
+
+    def __init__(self, scenario: Scenario, gains: LQRSettings) -> None:
+        super().__init__(scenario)
+        self.gains = gains
+        self._guidance = Guidance(scenario, gains.guidance)
+        model = scenario.filter_model()
+        if gains.deadband > 0:
+            self._stiffness = by_steps_left(scenario, lambda leg: _design(scenario, gains)[leg.index].stiffness)
+        self.K = by_steps_left(scenario, lambda leg: phase_gains(scenario, leg, gains))
+        to_accel = by_steps_left(scenario, lambda leg: np.linalg.pinv(model.steps(leg.start, leg.end).Gamma))
+        self._own_thrust = gains.feedforward * (to_accel @ self._guidance.residuals[..., None])[..., 0]
+
+    def acceleration(self, observation: Observations) -> Array:
+        """Accelerations (..., 3), m/s^2."""
+        now = self._guidance.track(observation)
+        acceleration: Array = self._own_thrust[now.at] - (self.K[now.at] @ now.error[..., None])[..., 0]
+        return np.where(self._pays(acceleration, now)[..., None], acceleration, 0.0)
+
+    def _pays(self, acceleration: Array, now: Tracking) -> NDArray[np.bool_]:
+        """Whether the first bit of an acceleration (..., 3) takes off more from the cost to come than the deadband."""
+        if self.gains.deadband == 0:
+            return np.ones(acceleration.shape[:-1], bool)
+        slope = (self._stiffness[now.at] @ acceleration[..., None])[..., 0]
+        return np.asarray(np.linalg.norm(slope, axis=-1) > self.gains.deadband * self.scenario.dt_s)
+
+
+def phase_gains(scenario: Scenario, leg: Leg, gains: LQRSettings) -> Array:
+    """Gains (steps, 3, 6) of a phase, from its beginning on."""
+    if gains.design == "expected_cost":
+        return _design(scenario, gains)[leg.index].gains
+    hold = _regulator(scenario, gains.hold)[leg.arrival : leg.end]
+    if gains.transfer.horizon == "infinite":
+        transfer = _regulator(scenario, gains.transfer.weights)[leg.start : leg.arrival]
+    else:
+        transfer = transfer_gains(scenario, leg, gains.guidance, gains.transfer)
+    return np.concatenate([transfer, hold])
+
+
+def _design(scenario: Scenario, gains: LQRSettings) -> tuple[PhaseDesign, ...]:
+    """The regulators of least expected cost."""
+    wanted = gains.expected_cost
+    return expected_cost_design(scenario, wanted.rounds, wanted.floor, wanted.price_scale)
+
+
+@lru_cache(maxsize=8)
+def _regulator(scenario: Scenario, weights: Weights) -> Array:
+    """Gains (steps, 3, 6) of a regulator without end: one gain, or if the model varies, one for each step."""
+    model, Q, R = scenario.filter_model(), weights.Q(), weights.R(scenario.orbit)
+    steps = scenario.num_steps
+    if model.Phi.ndim == 2:
+        return np.broadcast_to(stationary(model.Phi, model.Gamma, Q, R)[0], (steps, 3, 6))
+    _, P = stationary(model.Phi[-1], model.Gamma[-1], Q, R)
+    return finite_horizon_gains(model.Phi, model.Gamma, Q, np.broadcast_to(R, (steps, 3, 3)), P)
+
+
+@lru_cache(maxsize=64)
+def transfer_gains(scenario: Scenario, leg: Leg, guidance: Guide, transfer: TransferSettings) -> Array:
+    """Gains (steps, 3, 6) of a leg's transfer, from its start on; the weights are renewed for the nominal start."""
+    model = scenario.filter_model().steps(leg.start, leg.arrival)
+    start = nominal_start(scenario, leg) - desired_path(scenario, leg, guidance)[0]
+    R = np.tile(transfer.weights.R(scenario.orbit), (leg.arrival - leg.start, 1, 1))
+    limit = scenario.spacecraft.max_accel_m_s2
+    Q, rounds, floor = transfer.weights.Q(), transfer.rounds, transfer.floor
+    gains = least_fuel_gains(model.Phi, model.Gamma, R, Q, start, limit, rounds, floor)
+    gains.setflags(write=False)
+    return gains

@@ -1,0 +1,78 @@
+"""LQR about one plan: the cheapest undisturbed flight through all phases, which a cone program finds beforehand."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from baselines.controllers.lqr import ExpectedCostSettings
+from baselines.controllers.policy import AccelerationPolicy
+from baselines.design.phase_tables import by_steps_left, read_instants
+from baselines.design.reweighted_lqg import expected_cost_gains
+from baselines.optimal import OptimalPlan, fuel_optimal
+from formation_env.dynamics.perturbations import Perturbations
+from formation_env.numerics.arrays import Array, Observations
+from formation_env.settings import settings
+from formation_env.task.observation import observation_layout
+from formation_env.task.scenario import Scenario
+
+
+@settings
+class LQRPlannedSettings:
+    """Gains of `lqr_planned`.
+
+    Attributes:
+        expected_cost: how the feedback's gains are found.
+    """
+
+    expected_cost: ExpectedCostSettings = ExpectedCostSettings()
+
+
+class LQRPlanned(AccelerationPolicy):
+    """u = u_p - K (x_hat - x_p) about the plan x_p, u_p; K as of `lqr` with design `expected_cost`.
+
+    `lqr` designs each phase by itself; the plan knows what comes after, and where it pays to be when a phase ends.
+    """
+
+    Settings = LQRPlannedSettings
+
+    def __init__(self, scenario: Scenario, gains: LQRPlannedSettings) -> None:
+        """Plan, and find the gains.
+
+        Raises:
+            ModuleNotFoundError: Clarabel is not installed.
+        """
+        super().__init__(scenario)
+        self.gains = gains
+        self._layout = observation_layout(scenario)
+        plan, wanted = mission_plan(scenario), gains.expected_cost
+        K = expected_cost_gains(scenario, wanted.rounds, wanted.floor, wanted.price_scale)
+        self._path = by_steps_left(scenario, lambda leg: plan.states[leg.start : leg.end])
+        self._thrust = by_steps_left(scenario, lambda leg: plan.controls[leg.start : leg.end])
+        self._K = by_steps_left(scenario, lambda leg: K[leg.index])
+
+    def acceleration(self, observation: Observations) -> Array:
+        """Accelerations (..., 3), m/s^2."""
+        phase, steps_left = read_instants(observation, self._layout, self.scenario.dt_s)
+        at = phase, np.clip(steps_left, 0, self._path.shape[1] - 1)
+        off = self._layout.estimate(observation) - self._path[at]
+        acceleration: Array = self._thrust[at] - (self._K[at] @ off[..., None])[..., 0]
+        return acceleration
+
+
+@lru_cache(maxsize=32)
+def mission_plan(scenario: Scenario) -> OptimalPlan:
+    """The undisturbed flight of least cost from the nominal start, by the filter's model.
+
+    Raises:
+        ModuleNotFoundError: Clarabel is not installed.
+    """
+    belief = scenario.belief
+    believed = replace(
+        scenario,
+        dynamics=belief.dynamics,
+        orbit=belief.orbit,
+        spacecraft=replace(belief.spacecraft, max_accel_m_s2=scenario.spacecraft.max_accel_m_s2, thrust_noise=0.0),
+        perturbations=Perturbations(),
+    )
+    return fuel_optimal(believed)

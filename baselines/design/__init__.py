@@ -1,0 +1,1 @@
+"""Design of guidance and control laws: gains, reference paths and station keeping."""

@@ -1,0 +1,216 @@
+"""Gains of every step of a phase from the scenario's own cost, by iteratively reweighted LQG.
+
+The return counts |u| and |e|, not their squares. With weights 1 / rms |u_k| and price / rms |e_k| of the round before,
+a quadratic cost has the same sum, and its minimum moves towards the least E|u| and E|e| (Daubechies et al. 2010,
+doi 10.1002/cpa.20303, for sums without expectation). The rms values follow from the nominal start, its spread, and the
+noises, as if no measurement were lost.
+
+Legend: Phi, Gamma model; K gain (the filter's in `knowledge`); P covariance of the estimate's error, X of the estimate;
+S innovation covariance.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+
+from baselines.design.phase_tables import start_error
+from baselines.design.riccati import OVERLOAD, time_varying_regulator
+from baselines.design.steady_state_filter import measurement
+from formation_env.dynamics.base import DiscreteModel
+from formation_env.navigation.filter_settings import process_noise_covariance
+from formation_env.numerics.arrays import Array
+from formation_env.numerics.jit import compiled_loop
+from formation_env.task.scenario import Scenario
+from formation_env.task.schedule import Leg, legs
+
+FIRST_ERROR_M: Final = 100.0
+"""Position error that the first round expects everywhere."""
+ERROR_FLOOR_M: Final = 0.01
+"""Added to position errors, so that no weight is infinite."""
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """What the filter will know, whatever the controls are.
+
+    Attributes:
+        missed: covariances of the estimate's error just after each measurement (steps + 1, 6, 6).
+        learned: covariances of the estimate's change by each measurement (steps + 1, 6, 6).
+    """
+
+    missed: Array
+    learned: Array
+
+
+def knowledge(scenario: Scenario, model: DiscreteModel) -> Knowledge:
+    """The filter's covariances over an episode in which all measurements arrive (Ma 2009, eq. 4.71-4.75)."""
+    belief, start = scenario.belief, scenario.start
+    H, R_noise = measurement(scenario)
+    P = np.diag(np.repeat([start.spread_pos_m, start.spread_vel_m_s], 3) ** 2)
+    model = model.steps(0, scenario.num_steps)
+    Q_noise = process_noise_covariance(model.Gamma, belief.process_noise_m_s2)
+    missed, learned = np.zeros((2, scenario.num_steps + 1, 6, 6))
+    for step in range(scenario.num_steps + 1):
+        S = H @ P @ H.T + R_noise
+        K = P @ H.T @ np.linalg.pinv(S, hermitian=True)
+        learned[step] = K @ S @ K.T
+        # Joseph's form: P - K S K' is not positive where a sensor without noise leaves nothing
+        rest = np.eye(6) - K @ H
+        missed[step] = rest @ P @ rest.T + K @ R_noise @ K.T
+        if step < scenario.num_steps:
+            P = model.Phi[step] @ missed[step] @ model.Phi[step].T + Q_noise[step]
+    return Knowledge(missed, learned)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Root mean squares along a phase.
+
+    Attributes:
+        control: of the acceleration (steps,), m/s^2.
+        error: of the true position error (steps + 1,), m.
+        peak: of the acceleration's loudest axis (steps,), m/s^2.
+        last: second moment (6, 6) of the estimated error at the end.
+    """
+
+    control: Array
+    error: Array
+    peak: Array
+    last: Array
+
+
+def spread(model: DiscreteModel, gains: Array, start: Array, first: Array, known: Knowledge) -> Spread:
+    """How far controls and errors scatter under u = -K e_hat.
+
+    Args:
+        model: the filter's model of each step (steps, ...).
+        gains: (steps, 3, 6).
+        start: mean error (6,) at the beginning.
+        first: covariance (6, 6) of the estimate about it.
+        known: of the instants of the phase.
+    """
+    second, steps = np.zeros((len(gains) + 1, 6, 6)), len(gains)
+    second[0] = np.outer(start, start) + first
+    Phi, Gamma = (np.ascontiguousarray(part) for part in (model.Phi, model.Gamma))
+    _moments(Phi, Gamma, np.ascontiguousarray(gains), known.learned, second)
+    squares = ((gains @ second[:steps]) * gains).sum(axis=2)  # the diagonals of K X K'
+    in_position = np.einsum("tii->ti", second + known.missed)[:, :3]
+    return Spread(
+        control=np.sqrt(squares.sum(axis=1)),
+        error=np.sqrt(in_position.sum(axis=1)),
+        peak=np.sqrt(squares.max(axis=1)),
+        last=second[-1],
+    )
+
+
+@compiled_loop
+def _moments(Phi: Array, Gamma: Array, gains: Array, learned: Array, second: Array) -> None:
+    """Fill in the estimated error's second moments (steps + 1, 6, 6) from the first on."""
+    for step in range(len(gains)):
+        closed = Phi[step] - Gamma[step] @ gains[step]
+        second[step + 1] = closed @ second[step] @ closed.T + learned[step + 1]
+
+
+@dataclass(frozen=True)
+class PhaseDesign:
+    """A phase's regulator.
+
+    Attributes:
+        gains: K (steps, 3, 6) of u = -K (x_hat - reference).
+        stiffness: (steps, 3, 3), see `riccati.time_varying_regulator`; the cost's unit is m/s.
+    """
+
+    gains: Array
+    stiffness: Array
+
+
+def expected_cost_gains(
+    scenario: Scenario, rounds: int = 30, floor: float = 3e-4, price_scale: float = 1.0
+) -> tuple[Array, ...]:
+    """Gains (steps, 3, 6) of each phase, see `expected_cost_design`."""
+    return tuple(design.gains for design in expected_cost_design(scenario, rounds, floor, price_scale))
+
+
+@lru_cache(maxsize=32)
+def expected_cost_design(
+    scenario: Scenario, rounds: int = 30, floor: float = 3e-4, price_scale: float = 1.0
+) -> tuple[PhaseDesign, ...]:
+    """The regulator of each phase.
+
+    Each phase is judged by itself; its start is the nominal one with the second moment that the phase before ends with.
+
+    Args:
+        scenario: what is flown.
+        rounds: how often the weights are renewed.
+        floor: smallest thrust that is told from none, in units of max_accel_m_s2.
+        price_scale: factor of the scenario's price of errors.
+    """
+    known = knowledge(scenario, scenario.filter_model())
+    first, result = known.learned[0], []
+    for leg in legs(scenario):
+        instants = slice(leg.start, leg.end + 1)
+        here = Knowledge(known.missed[instants], known.learned[instants])
+        start = start_error(scenario, leg)
+        design, first = _design(scenario, leg, start, first, here, rounds, floor, price_scale)
+        for part in (design.gains, design.stiffness):
+            part.setflags(write=False)
+        result.append(design)
+    return tuple(result)
+
+
+def _design(
+    scenario: Scenario,
+    leg: Leg,
+    start: Array,
+    first: Array,
+    known: Knowledge,
+    rounds: int,
+    floor: float,
+    price_scale: float,
+) -> tuple[PhaseDesign, Array]:
+    """The regulator of a phase, and the second moment (6, 6) of the estimated error at its end."""
+    limit, position = scenario.spacecraft.max_accel_m_s2, np.diag([1.0, 1, 1, 0, 0, 0])
+    model = scenario.filter_model().steps(leg.start, leg.end)
+    price = price_scale * _error_price(scenario, leg)
+    control_weight, error_weight = np.full(leg.end - leg.start, scenario.dt_s / limit), price / FIRST_ERROR_M
+    for _ in range(rounds + 1):
+        Q, R = error_weight[:, None, None] * position, control_weight[:, None, None] * np.eye(3)
+        gains, stiffness = time_varying_regulator(model.Phi, model.Gamma, Q, R)
+        seen = spread(model, gains, start, first, known)
+        overload = 1 + OVERLOAD * np.maximum(seen.peak / limit - 1, 0)
+        control_weight = np.sqrt(control_weight * scenario.dt_s * overload / (seen.control + floor * limit))
+        error_weight = np.sqrt(error_weight * price * _steepness(scenario, seen.error))
+    return PhaseDesign(gains, stiffness), seen.last
+
+
+def _error_price(scenario: Scenario, leg: Leg) -> Array:
+    """Price (steps + 1,) of an error at each instant of a phase, (m/s) per m."""
+    reward = scenario.reward
+    in_hold = np.arange(leg.start, leg.end + 1) > leg.arrival
+    weight = np.where(in_hold, reward.error_weight, reward.transfer_error_weight)
+    return weight * scenario.dt_s / scenario.hold_s
+
+
+def _steepness(scenario: Scenario, error_m: Array) -> Array:
+    """Cost per price and squared error (...), 1/m."""
+    if scenario.reward.shape == "quadratic":
+        return np.full(error_m.shape, 1 / scenario.reward.quadratic_scale_m)
+    return 1 / (error_m + ERROR_FLOOR_M)
+
+
+def episode_scatter(scenario: Scenario) -> tuple[Array, Array]:
+    """How far an episode scatters about its mean under `expected_cost_gains`.
+
+    Returns:
+        Root mean squares of the true position error (num_steps + 1,), m, and of the acceleration (num_steps,), m/s^2.
+    """
+    known = knowledge(scenario, scenario.filter_model())
+    first, error, control = known.learned[0], np.zeros(scenario.num_steps + 1), np.zeros(scenario.num_steps)
+    for leg, gains in zip(legs(scenario), expected_cost_gains(scenario), strict=True):
+        instants = slice(leg.start, leg.end + 1)
+        here = Knowledge(known.missed[instants], known.learned[instants])
+        seen = spread(scenario.filter_model().steps(leg.start, leg.end), gains, np.zeros(6), first, here)
+        error[instants], control[leg.start : leg.end], first = seen.error, seen.control, seen.last
+    return error, control

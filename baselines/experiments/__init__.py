@@ -1,0 +1,1 @@
+"""Flights of policies in many processes, kept on disk, and their statistics."""

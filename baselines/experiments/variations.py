@@ -1,0 +1,138 @@
+"""What is varied. To add a quantity: a function here, and a line in `VARIATIONS`."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from formation_env.dropout import GilbertElliott
+from formation_env.dynamics import NONLINEAR
+from formation_env.task.scenario import Scenario
+
+Pair = tuple[Scenario, Scenario]
+"""The scenario that is flown, and the one that policies are made for."""
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A quantity that is varied.
+
+    Attributes:
+        vary: makes the scenarios for one of its values, each from the same scenario.
+        values: of the quantity, ascending.
+        label: what the axis says, with the unit.
+        log: whether the axis is logarithmic.
+        names: what the axis says in place of values, where they are kinds.
+    """
+
+    vary: Callable[[Scenario, float], Pair]
+    values: tuple[float, ...]
+    label: str
+    log: bool = False
+    names: dict[float, str] = field(default_factory=dict)
+
+    @property
+    def few(self) -> tuple[float, ...]:
+        """Every second value and the middle one, for a quick look."""
+        middle = len(self.values) // 2
+        return tuple(value for index, value in enumerate(self.values) if index % 2 == 0 or index == middle)
+
+
+def error_weight(scenario: Scenario, factor: float) -> Pair:
+    """Price of the mean error, in units of the scenario's."""
+    weight = factor * scenario.reward.error_weight
+    return _told(replace(scenario, reward=replace(scenario.reward, error_weight=weight)))
+
+
+def outage_length(scenario: Scenario, mean_outage_s: float) -> Pair:
+    """Mean outage, s, with the scenario's share of lost measurements."""
+    return _bursts(scenario, mean_outage_s, lost_share(scenario)), scenario
+
+
+def measurement_loss(scenario: Scenario, share: float) -> Pair:
+    """Share of lost measurements, with the scenario's mean outage."""
+    dropout = scenario.dropout
+    known = dropout if isinstance(dropout, GilbertElliott) else GilbertElliott()
+    return _bursts(scenario, known.mean_outage_s, share), scenario
+
+
+def lost_share(scenario: Scenario) -> float:
+    """The scenario's long-run share of lost measurements; where its chain loses none, Gilbert-Elliott's default."""
+    models = (scenario.dropout, GilbertElliott())
+    shares = [model.chain(scenario.dt_s, scenario.orbit).stationary_loss for model in models]
+    return shares[0] or shares[1]
+
+
+def _bursts(scenario: Scenario, mean_outage_s: float, share: float) -> Scenario:
+    # share = outage / (outage + between)
+    between_s = mean_outage_s * (1 - share) / share
+    periods = between_s / scenario.orbit.period_s
+    return replace(scenario, dropout=GilbertElliott(mean_outage_s=mean_outage_s, mean_between_periods=periods))
+
+
+def sensor_noise(scenario: Scenario, factor: float) -> Pair:
+    """The sensor's sigmas, in units of the scenario's."""
+    known = scenario.sensor
+    sigmas = {"sigma_pos_m": factor * known.sigma_pos_m, "sigma_vel_m_s": factor * known.sigma_vel_m_s}
+    return _told(replace(scenario, sensor=replace(known, **sigmas)))
+
+
+def thrust_limit(scenario: Scenario, factor: float) -> Pair:
+    """Greatest thrust, in units of the scenario's."""
+    return _told(_with_thrust(scenario, factor))
+
+
+def initial_error(scenario: Scenario, factor: float) -> Pair:
+    """Spread of the start, in units of the scenario's."""
+    known = scenario.start
+    spread = {"spread_pos_m": factor * known.spread_pos_m, "spread_vel_m_s": factor * known.spread_vel_m_s}
+    return _told(replace(scenario, start=replace(known, **spread)))
+
+
+def true_dynamics(scenario: Scenario, nonlinear: float) -> Pair:
+    """The filter's linear model as the truth (0), or the nonlinear one (1)."""
+    return replace(scenario, dynamics=NONLINEAR if nonlinear else scenario.belief.dynamics), scenario
+
+
+def ballistic_coefficient(scenario: Scenario, percent: float) -> Pair:
+    """The follower's ballistic coefficient m / (C_d S) off by so many per cent; leader and filter stay as they were."""
+    known = scenario.spacecraft
+    true = replace(known, area_m2=known.area_m2 / (1 + percent / 100))
+    believed = replace(scenario.filter, spacecraft=scenario.belief.spacecraft)
+    return replace(scenario, spacecraft=true, leader_spacecraft=scenario.leader, filter=believed), scenario
+
+
+def thrust_magnitude(scenario: Scenario, percent: float) -> Pair:
+    """Thrust so many per cent above what the policy commands; the filter knows the thrust that acts."""
+    return _with_thrust(scenario, 1 + percent / 100), scenario
+
+
+def _with_thrust(scenario: Scenario, factor: float) -> Scenario:
+    limit = factor * scenario.spacecraft.max_accel_m_s2
+    return replace(scenario, spacecraft=replace(scenario.spacecraft, max_accel_m_s2=limit))
+
+
+def _told(scenario: Scenario) -> Pair:
+    return scenario, scenario
+
+
+FRONT: Final = "error_weight"
+"""The quantity whose values make the front."""
+
+VARIATIONS: Final[dict[str, Variation]] = {
+    FRONT: Variation(error_weight, (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0), "price of error, × the scenario's", log=True),
+    "outage_length": Variation(outage_length, (60.0, 300.0, 600.0, 1200.0, 3000.0), "mean outage, s", log=True),
+    "measurement_loss": Variation(measurement_loss, (0.02, 0.1, 0.3, 0.5, 0.7), "share of lost measurements"),
+    "sensor_noise": Variation(sensor_noise, (0.1, 0.3, 1.0, 3.0, 10.0), "sensor noise, × the scenario's", log=True),
+    "thrust_limit": Variation(thrust_limit, (0.3, 0.5, 1.0, 2.0, 5.0), "thrust limit, × the scenario's", log=True),
+    "initial_error": Variation(initial_error, (0.1, 0.3, 1.0, 3.0, 10.0), "initial error, × the scenario's", log=True),
+    "true_dynamics": Variation(
+        true_dynamics, (0.0, 1.0), "true dynamics", names={0.0: "as the filter's", 1.0: "nonlinear"}
+    ),
+    "ballistic_coefficient": Variation(
+        ballistic_coefficient, (-50.0, 0.0, 50.0), "ballistic coefficient, % above the believed"
+    ),
+    "thrust_magnitude": Variation(
+        thrust_magnitude, (-20.0, -10.0, 0.0, 10.0, 20.0), "thrust magnitude, % above the commanded"
+    ),
+}
+"""Quantities by name, the front's first. Policies are told of price, noise, limit and start; the rest they bear."""

@@ -1,0 +1,1 @@
+"""The source thesis's claims, each tested on flights."""

@@ -1,0 +1,1 @@
+"""Errors of the linear models against the nonlinear truth."""

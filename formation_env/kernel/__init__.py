@@ -1,0 +1,1 @@
+"""The compiled step: one function a stage, single and batched alike."""

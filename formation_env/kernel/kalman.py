@@ -1,0 +1,194 @@
+"""The sensor and the discrete Kalman filter (Ma 2009, eq. 4.69-4.75).
+
+Legend: x_hat estimate, P error covariance, Phi transition matrix, Q_noise and R_noise noise covariances.
+
+In the linear models the orbit plane (x, y, x', y') and the cross-track axis (z, z') do not influence each other, nor do
+their measurement errors; so their covariances have no common elements and they are filtered apart. A symmetric matrix
+is a tuple of its upper triangle, row by row. Measurements are independent, so they are taken one at a time.
+"""
+
+from formation_env.numerics.fastmath import fma
+from formation_env.numerics.jit import inline_scalar
+
+Symmetric2 = tuple[float, float, float]
+Symmetric4 = tuple[float, float, float, float, float, float, float, float, float, float]
+State4 = tuple[float, float, float, float]
+Matrix2 = tuple[float, float, float, float]
+
+
+@inline_scalar
+def time_update_2(P: Symmetric2, Phi: Matrix2, Q_noise: Symmetric2) -> Symmetric2:
+    """Phi P Phi' + Q_noise of the cross-track axis (eq. 4.75)."""
+    p00, p01, p11 = P
+    a, b, c, d = Phi
+    u0, u1 = a * p00 + b * p01, a * p01 + b * p11
+    v0, v1 = c * p00 + d * p01, c * p01 + d * p11
+    return u0 * a + u1 * b + Q_noise[0], u0 * c + u1 * d + Q_noise[1], v0 * c + v1 * d + Q_noise[2]
+
+
+@inline_scalar
+def _dot(u: State4, a: float, b: float, c: float, d: float) -> float:
+    return fma(u[0], a, fma(u[1], b, fma(u[2], c, u[3] * d)))
+
+
+@inline_scalar
+def _times_symmetric(a: float, b: float, c: float, d: float, P: Symmetric4) -> State4:
+    """Row vector times symmetric matrix."""
+    p00, p01, p02, p03, p11, p12, p13, p22, p23, p33 = P
+    row = (a, b, c, d)
+    return (
+        _dot(row, p00, p01, p02, p03),
+        _dot(row, p01, p11, p12, p13),
+        _dot(row, p02, p12, p22, p23),
+        _dot(row, p03, p13, p23, p33),
+    )
+
+
+@inline_scalar
+def time_update_4(P: Symmetric4, Phi: tuple[float, ...], Q_noise: Symmetric4) -> Symmetric4:
+    """Phi P Phi' + Q_noise of the orbit plane (eq. 4.75); Phi row by row (16)."""
+    a0, a1, a2, a3, b0, b1, b2, b3, c0, c1, c2, c3, d0, d1, d2, d3 = Phi
+    a = _times_symmetric(a0, a1, a2, a3, P)
+    b = _times_symmetric(b0, b1, b2, b3, P)
+    c = _times_symmetric(c0, c1, c2, c3, P)
+    d = _times_symmetric(d0, d1, d2, d3, P)
+    return (
+        _dot(a, a0, a1, a2, a3) + Q_noise[0],
+        _dot(a, b0, b1, b2, b3) + Q_noise[1],
+        _dot(a, c0, c1, c2, c3) + Q_noise[2],
+        _dot(a, d0, d1, d2, d3) + Q_noise[3],
+        _dot(b, b0, b1, b2, b3) + Q_noise[4],
+        _dot(b, c0, c1, c2, c3) + Q_noise[5],
+        _dot(b, d0, d1, d2, d3) + Q_noise[6],
+        _dot(c, c0, c1, c2, c3) + Q_noise[7],
+        _dot(c, d0, d1, d2, d3) + Q_noise[8],
+        _dot(d, d0, d1, d2, d3) + Q_noise[9],
+    )
+
+
+@inline_scalar
+def thrust_noise_update_4(P: Symmetric4, Gamma: tuple[float, ...], ax: float, ay: float, variance: float) -> Symmetric4:
+    """P + variance (Gamma a) (Gamma a)': the uncertainty of a thrust a whose magnitude has a relative error.
+
+    The same error acts on the cross-track axis. That correlation between the two parts of the state is left out.
+    """
+    p00, p01, p02, p03, p11, p12, p13, p22, p23, p33 = P
+    g0, g1 = Gamma[0] * ax + Gamma[1] * ay, Gamma[2] * ax + Gamma[3] * ay
+    g2, g3 = Gamma[4] * ax + Gamma[5] * ay, Gamma[6] * ax + Gamma[7] * ay
+    v0, v1, v2, v3 = variance * g0, variance * g1, variance * g2, variance * g3
+    return (
+        p00 + v0 * g0,
+        p01 + v0 * g1,
+        p02 + v0 * g2,
+        p03 + v0 * g3,
+        p11 + v1 * g1,
+        p12 + v1 * g2,
+        p13 + v1 * g3,
+        p22 + v2 * g2,
+        p23 + v2 * g3,
+        p33 + v3 * g3,
+    )
+
+
+@inline_scalar
+def thrust_noise_update_2(P: Symmetric2, Gamma: tuple[float, float], az: float, variance: float) -> Symmetric2:
+    """The same of the cross-track axis."""
+    g0, g1 = Gamma[0] * az, Gamma[1] * az
+    return P[0] + variance * g0 * g0, P[1] + variance * g0 * g1, P[2] + variance * g1 * g1
+
+
+@inline_scalar
+def measure_first(
+    x_hat: State4, P: Symmetric4, z: float, variance: float, received: float
+) -> tuple[State4, Symmetric4, float]:
+    """Measurement update (eq. 4.71-4.73) with one measurement of the state's first element.
+
+    The measured element's row of the covariance takes Joseph's form, (I - K H) P (I - K H)' + K R_noise K', where
+    (I - K H) P would cancel; the rest is P - K H P, to which Joseph's form reduces for this gain. It is symmetric by
+    construction.
+
+    Args:
+        x_hat: estimate (4).
+        P: its covariance (10).
+        z: the measurement.
+        variance: R_noise of the measurement.
+        received: 1 if it arrived, else 0; then nothing changes.
+
+    Returns:
+        Estimate, covariance, and the squared innovation over its variance.
+    """
+    x0, x1, x2, x3 = x_hat
+    p00, p01, p02, p03, p11, p12, p13, p22, p23, p33 = P
+    s = p00 + variance
+    weight = received / s if s > 0.0 else 0.0
+    innovation = z - x0
+    k0, k1, k2, k3 = p00 * weight, p01 * weight, p02 * weight, p03 * weight
+    rest = 1.0 - k0
+    new_x = (x0 + k0 * innovation, x1 + k1 * innovation, x2 + k2 * innovation, x3 + k3 * innovation)
+    new_P = (
+        rest * rest * p00 + k0 * k0 * variance,
+        rest * (p01 - k1 * p00) + k0 * k1 * variance,
+        rest * (p02 - k2 * p00) + k0 * k2 * variance,
+        rest * (p03 - k3 * p00) + k0 * k3 * variance,
+        fma(-k1, p01, p11),
+        fma(-k1, p02, p12),
+        fma(-k1, p03, p13),
+        fma(-k2, p02, p22),
+        fma(-k2, p03, p23),
+        fma(-k3, p03, p33),
+    )
+    return new_x, new_P, innovation * innovation * weight
+
+
+@inline_scalar
+def measurement_update_4(
+    x_hat: State4, P: Symmetric4, z: State4, variances: tuple[float, float], received: tuple[float, float]
+) -> tuple[State4, Symmetric4, float]:
+    """Take the orbit plane's position, then velocity measurements.
+
+    Args:
+        x_hat: estimate (x, y, x', y').
+        P: its covariance.
+        z: the measurements.
+        variances: of a position and of a velocity axis.
+        received: 1 or 0 for position and for velocity.
+
+    Returns:
+        Estimate, covariance, normalised innovation squared.
+    """
+    (x, y, u, v), (xx, xy, xu, xv, yy, yu, yv, uu, uv, vv), nis_x = measure_first(
+        x_hat, P, z[0], variances[0], received[0]
+    )
+    (y, x, u, v), (yy, xy, yu, yv, xx, xu, xv, uu, uv, vv), nis_y = measure_first(
+        (y, x, u, v), (yy, xy, yu, yv, xx, xu, xv, uu, uv, vv), z[1], variances[0], received[0]
+    )
+    (u, y, x, v), (uu, yu, xu, uv, yy, xy, yv, xx, xv, vv), nis_u = measure_first(
+        (u, y, x, v), (uu, yu, xu, uv, yy, xy, yv, xx, xv, vv), z[2], variances[1], received[1]
+    )
+    (v, y, u, x), (vv, yv, uv, xv, yy, yu, xy, uu, xu, xx), nis_v = measure_first(
+        (v, y, u, x), (vv, yv, uv, xv, yy, yu, xy, uu, xu, xx), z[3], variances[1], received[1]
+    )
+    return (x, y, u, v), (xx, xy, xu, xv, yy, yu, yv, uu, uv, vv), nis_x + nis_y + nis_u + nis_v
+
+
+@inline_scalar
+def measurement_update_2(
+    x_hat: tuple[float, float],
+    P: Symmetric2,
+    z: tuple[float, float],
+    variances: tuple[float, float],
+    received: tuple[float, float],
+) -> tuple[tuple[float, float], Symmetric2, float]:
+    """Take the cross-track position, then velocity measurement: `measure_first` with two of its states unused."""
+    p00, p01, p11 = P
+    (z0, v0, _, _), (p00, p01, _, _, p11, _, _, _, _, _), nis_z = measure_first(
+        (x_hat[0], x_hat[1], 0.0, 0.0),
+        (p00, p01, 0.0, 0.0, p11, 0.0, 0.0, 0.0, 0.0, 0.0),
+        z[0],
+        variances[0],
+        received[0],
+    )
+    (v0, z0, _, _), (p11, p01, _, _, p00, _, _, _, _, _), nis_v = measure_first(
+        (v0, z0, 0.0, 0.0), (p11, p01, 0.0, 0.0, p00, 0.0, 0.0, 0.0, 0.0, 0.0), z[1], variances[1], received[1]
+    )
+    return (z0, v0), (p00, p01, p11), nis_z + nis_v

@@ -1,0 +1,1 @@
+"""Settings of the sensor and of the Kalman filter."""

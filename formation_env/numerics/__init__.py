@@ -1,0 +1,1 @@
+"""Array types, compiled arithmetic and random streams: no physics."""

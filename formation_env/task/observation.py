@@ -1,0 +1,163 @@
+"""The observation: its one layout, used by the environments, the policies and the documentation.
+
+It never holds the truth: all of it comes from the filter's estimate, the clock and the plan.
+"""
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from formation_env.numerics.arrays import Array
+from formation_env.task.scenario import Scenario
+from formation_env.task.schedule import leg_reference, legs
+
+BOUND: Final = 30.0
+"""Every element lies within [-BOUND, BOUND]; what is beyond is cut off."""
+LEAST_LENGTH_M: Final = 1000.0
+LOG_UNIT_POS_M: Final = 1.0
+LOG_UNIT_VEL_M_S: Final = 1e-3
+LOG_RANGE: Final = 1e4
+"""The compressed elements reach 1 at this many units."""
+SIGMA_UNIT_POS_M: Final = 1.0
+SIGMA_UNIT_VEL_M_S: Final = 1e-3
+SIGMA_DECADES: Final = 3.0
+"""The logarithm of sigma reaches 1 this many decades above its unit."""
+SIGMA_FLOOR: Final = 1e-6
+"""Sigmas below this many units are shown as this."""
+
+
+@dataclass(frozen=True)
+class Block:
+    """Neighbouring elements of the observation.
+
+    Attributes:
+        name: what to ask for.
+        size: how many elements.
+        meaning: for the documentation.
+        unit: of the physical value.
+        scale: how the physical value becomes the element.
+    """
+
+    name: str
+    size: int
+    meaning: str
+    unit: str
+    scale: str
+
+
+_LINEAR = "/ (L, n L)"
+_COMPRESSED = "sign(e) log(1 + |e| / (1 m, 1 mm/s)) / log(1 + 1e4)"
+
+BLOCKS: Final = (
+    Block("error", 6, "estimated state minus reference state", "m, m/s", _LINEAR),
+    Block("arrival_error", 6, "error at arrival if the follower only coasts; in hold the error now", "m, m/s", _LINEAR),
+    Block("error_log", 6, "error, compressed", "m, m/s", _COMPRESSED),
+    Block("arrival_error_log", 6, "arrival_error, compressed", "m, m/s", _COMPRESSED),
+    Block("reference", 6, "reference state", "m, m/s", _LINEAR),
+    Block("time_to_arrival", 1, "time to the end of the transfer; 0 in hold", "s", "/ period"),
+    Block("in_hold", 1, "1 in hold, 0 in transfer", "", ""),
+    Block("phase", 1, "index of the phase", "", "/ number of phases"),
+    Block("time_left", 1, "time to the end of the phase", "s", "/ period"),
+    Block("sigma_pos", 1, "filter's 1-sigma position error, root mean square of the axes", "m", "log10(/ 1 m) / 3"),
+    Block(
+        "sigma_vel", 1, "filter's 1-sigma velocity error, root mean square of the axes", "m/s", "log10(/ 1 mm/s) / 3"
+    ),
+    Block("measured", 1, "1 if the last measurement arrived, else 0", "", ""),
+    Block(
+        "measurement_age",
+        1,
+        "time since the last measurement that arrived, or since the start",
+        "s",
+        "log(1 + / dt) / log(1 + period / dt)",
+    ),
+)
+
+
+def _slices() -> dict[str, slice]:
+    ends = np.cumsum([block.size for block in BLOCKS])
+    return {block.name: slice(int(end) - block.size, int(end)) for block, end in zip(BLOCKS, ends, strict=True)}
+
+
+SLICES: Final = _slices()
+SIZE: Final = sum(block.size for block in BLOCKS)
+
+
+@dataclass(frozen=True)
+class ObservationLayout:
+    """Where each quantity stands in a scenario's observation, and its scale.
+
+    Attributes:
+        length_m: L, the largest distance of the plan from the leader; at least 1 km, and at least so much that errors
+            up to the scenario's distance limit stay within the bounds.
+        mean_motion_rad_s: n; n L is the scale of velocities.
+        period_s: the scale of times, s.
+        num_phases: phases of the plan.
+    """
+
+    length_m: float
+    mean_motion_rad_s: float
+    period_s: float
+    num_phases: int
+
+    @property
+    def state_scale(self) -> Array:
+        """Scale (6,) of states: m and m/s per unit."""
+        return np.repeat([self.length_m, self.length_m * self.mean_motion_rad_s], 3)
+
+    def state(self, observation: NDArray[np.floating], name: str) -> Array:
+        """A block of six, `error`, `arrival_error` or `reference`, in m and m/s.
+
+        Args:
+            observation: (..., SIZE).
+            name: the block.
+
+        Returns:
+            States (..., 6).
+        """
+        block: Array = observation[..., SLICES[name]].astype(np.float64) * self.state_scale
+        return block
+
+    def estimate(self, observation: NDArray[np.floating]) -> Array:
+        """The filter's estimated LVLH state (..., 6), m and m/s."""
+        return self.state(observation, "error") + self.state(observation, "reference")
+
+    def scalar(self, observation: NDArray[np.floating], name: str) -> Array:
+        """A block of one (...), in units of the observation."""
+        value: Array = observation[..., SLICES[name].start].astype(np.float64)
+        return value
+
+    def time_to_arrival_s(self, observation: NDArray[np.floating]) -> Array:
+        """Time to arrival (...), s."""
+        return self.scalar(observation, "time_to_arrival") * self.period_s
+
+    def phase(self, observation: NDArray[np.floating]) -> NDArray[np.intp]:
+        """Index of the phase (...)."""
+        return np.rint(self.scalar(observation, "phase") * self.num_phases).astype(np.intp)
+
+
+def markdown_table() -> str:
+    """The layout as a Markdown table: index, name, meaning, unit, scale."""
+    lines = ["| index | name | meaning | unit | scale |", "|---|---|---|---|---|"]
+    for block in BLOCKS:
+        first, last = SLICES[block.name].start, SLICES[block.name].stop - 1
+        index = f"{first}" if first == last else f"{first}-{last}"
+        cells = (index, f"`{block.name}`", block.meaning, block.unit, block.scale.replace("|", "\\|"))
+        lines.append(f"| {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def observation_layout(scenario: Scenario) -> ObservationLayout:
+    """The observation layout with the scenario's scales."""
+    start = np.linalg.norm(scenario.start.formation.state(scenario.orbit)[:3])
+    held = [
+        np.linalg.norm(leg_reference(scenario, leg, np.arange(leg.arrival, leg.end + 1))[:, :3], axis=1).max()
+        for leg in legs(scenario)
+    ]
+    return ObservationLayout(
+        length_m=float(max(start, *held, LEAST_LENGTH_M, scenario.limits.max_distance_m / BOUND)),
+        mean_motion_rad_s=scenario.orbit.mean_motion_rad_s,
+        period_s=scenario.orbit.period_s,
+        num_phases=len(scenario.phases),
+    )
