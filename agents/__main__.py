@@ -169,7 +169,7 @@ def bench(
 def curve(
     runs: Annotated[list[Path], typer.Argument(help="Folders of runs, of any algorithms, environments and seeds.")],
     out: Annotated[Path, typer.Option(file_okay=False, help="Folder of the pictures, learning_ENVIRONMENT.png.")],
-    baseline: Annotated[list[str], typer.Option(help="Classical policies drawn as levels.")] = ["lqr", "lqr_planned"],  # noqa: B006
+    baseline: Annotated[list[str], typer.Option(help="Classical policies drawn as levels.")] = ["lqr", "lqr_nominal"],  # noqa: B006
     bounds: Bounds = BOUNDS,
 ) -> None:
     """Draw learning curves, a picture per environment; classical policies fly the same validation seeds as levels."""

@@ -6,11 +6,12 @@ keys and wrong types are refused, and numbers are never read out of strings.
 
 import difflib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from dataclasses import fields as dataclass_fields
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Final, TypeVar, cast, dataclass_transform
+from typing import Annotated, Any, Final, TypeVar, cast, dataclass_transform, overload
 
 import pydantic
 from pydantic import AllowInfNan, ConfigDict, Field, GetCoreSchemaHandler, Strict
@@ -39,15 +40,37 @@ class ConfigError(ValueError):
     """A settings file or object is wrong; the message is one line that names file, key and value."""
 
 
+@overload
+def settings(cls: type[T]) -> type[T]: ...
+
+
+@overload
+def settings(*, renamed: Mapping[str, str]) -> Callable[[type[T]], type[T]]: ...
+
+
 @dataclass_transform(frozen_default=True, kw_only_default=True)
-def settings(cls: type[T]) -> type[T]:
-    """Make a class a frozen, keyword-only dataclass that validates its fields on construction."""
+def settings(cls: type[T] | None = None, *, renamed: Mapping[str, str] | None = None) -> Any:
+    """Make a class a frozen, keyword-only dataclass that validates its fields on construction.
+
+    Args:
+        cls: the class.
+        renamed: keys of an earlier version -> their new names, which the error for an old key gives.
+    """
+    if cls is None:
+        return partial(_make_settings, renamed=renamed or {})
+    return _make_settings(cls, renamed or {})
+
+
+def _make_settings(cls: type[T], renamed: Mapping[str, str]) -> type[T]:
+    """Add the validation of keys, and make the dataclass."""
 
     def refuse_unknown_keys(owner: type, data: Any) -> Any:
         given = data.kwargs if isinstance(data, ArgsKwargs) else data
         known = [field.name for field in dataclass_fields(owner)]
         for key in given if isinstance(given, Mapping) else ():
             if key not in known:
+                if key in renamed:
+                    raise PydanticCustomError("renamed_key", "now {new}", {"key": str(key), "new": renamed[key]})
                 hint = nearest(str(key), known)
                 raise PydanticCustomError("unknown_key", "unknown key; {hint}", {"key": str(key), "hint": hint})
         return data
@@ -114,7 +137,7 @@ def _describe(fault: ErrorDetails, data: Any) -> str:
     message = message.removeprefix("Value error, ").replace("Input should", "must", 1)
     if fault["type"] == "value_error" and not fault["loc"]:
         return message  # a check of the whole object; it names its keys
-    if fault["type"] in ("unknown_key", "missing_kind", "unknown_kind", "value_error", "missing"):
+    if fault["type"] in ("unknown_key", "renamed_key", "missing_kind", "unknown_kind", "value_error", "missing"):
         return f"{path}: {message}"
     given = fault["input"]
     if isinstance(given, str):

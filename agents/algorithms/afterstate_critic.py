@@ -80,7 +80,7 @@ class Foresight(nn.Module):
 
 def _maps(scenario: Scenario) -> Array:
     """For each step the matrix (T, 12, 10) from error, thrust and 1 to error and arrival error after it; m, m/s."""
-    table, model = build_schedule(scenario), scenario.filter_model().steps(0, scenario.num_steps)
+    table, model = build_schedule(scenario), scenario.filter_dynamics().steps(0, scenario.num_steps)
     r, A = columns(table, "reference"), coast_matrices(table)
     maps = np.zeros((scenario.num_steps, 12, 10))
     # x' - r' = Phi e + Gamma u + (Phi r + delta - r')

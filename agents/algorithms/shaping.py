@@ -30,7 +30,7 @@ class Shaping:
 
     def potential(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
         """Minus the weighted miss at arrival (...), m/s, of observations (..., SIZE)."""
-        miss_m = self._layout.state(observations, "arrival_error")[..., :3]
+        miss_m = self._layout.state(observations, "zero_effort_miss")[..., :3]
         return -self._weight * np.sqrt(np.square(miss_m).sum(axis=-1))
 
     def restart(self, observations: NDArray[np.float32]) -> None:

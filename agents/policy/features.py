@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from formation_env.task.observation import SIZE, SLICES
 
-MAGNIFIED: Final = slice(SLICES["error"].start, SLICES["arrival_error"].stop)
-"""The blocks `error` and `arrival_error`, which stand side by side."""
+MAGNIFIED: Final = slice(SLICES["error"].start, SLICES["zero_effort_miss"].stop)
+"""The blocks `error` and `zero_effort_miss`, which stand side by side."""
 REST: Final = slice(SLICES["reference"].start, SIZE)
 """What of an observation does not depend on the state: plan, clock and filter."""
 CUT: Final = 5.0

@@ -34,7 +34,7 @@ class ModelEpisodes:
         scenario = recording.scenario
         self.rows, self.steps = recording.starts.shape[0], scenario.num_steps
         self._scenario = scenario
-        table, model = build_schedule(scenario), scenario.true_model()
+        table, model = build_schedule(scenario), scenario.true_dynamics()
         Phi, Gamma, delta = (
             np.broadcast_to(part, (self.steps, *part.shape[-rank:]))
             for part, rank in ((model.Phi, 2), (model.Gamma, 2), (model.delta, 1))
@@ -49,7 +49,7 @@ class ModelEpisodes:
         self._both, self._offset = _tensor(matrices.swapaxes(1, 2)), _tensor(np.concatenate([-r, b], axis=1) / unit)
         self._linear = _tensor(magnification * unit / np.tile(observation_layout(scenario).state_scale, 2))
         self._price, self._scored = (
-            _tensor(column(table, "error_price")),
+            _tensor(column(table, "error_weight")),
             _tensor(columns(table, "scored_position")),
         )
         self._starts, self._errors = _tensor(recording.starts), _tensor(recording.estimate_errors)
@@ -80,7 +80,7 @@ class ModelEpisodes:
     def _judged(self, misses: Tensor) -> Tensor:
         """What the reward counts of position errors (..., 3), m."""
         reward = self._scenario.reward
-        if reward.shape == "quadratic":
+        if reward.error_cost == "quadratic":
             return (misses**2).sum(dim=-1) / reward.quadratic_scale_m
         return _norm(misses, SMOOTH_M)
 

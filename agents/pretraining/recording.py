@@ -63,6 +63,6 @@ def record_disturbances(scenario: Scenario, seeds: Sequence[int]) -> Recording:
         if terminated.any():
             raise ConfigError("pretraining: an episode without thrust ends early; widen limits.max_distance_m")
     states[steps] = infos["final_info"]["true_state"]
-    model = scenario.true_model()
+    model = scenario.true_dynamics()
     free = np.einsum("...ij,...rj->...ri", model.Phi, states[:-1]) + model.delta[..., None, :]
     return Recording(scenario, states[0], states[1:] - free, errors, rest)

@@ -11,7 +11,7 @@ from baselines.experiments.statistics import Results
 from baselines.report.table import Table
 from baselines.report.words import duration, numbers
 
-LINEAR: Final = ("lqr", "lqr_finite", "lqr_tracking", "smc")
+LINEAR: Final = ("lqr", "lqr_finite", "lqr_quasi_static", "smc")
 """The LQR and sliding-mode policies that solve no cone program."""
 YARDSTICK: Final = "mpc"
 """Whose time for an action stands beside the learned policies'."""

@@ -44,7 +44,7 @@ class Deadband(AccelerationPolicy):
         self._guidance = Guidance(scenario, gains.guidance)
         self._course = MidCourse(scenario, gains.correction)
         self._keeping = Keeping(scenario, gains.keeping)
-        model = scenario.filter_model()
+        model = scenario.filter_dynamics()
         to_accel = by_steps_left(scenario, lambda leg: np.linalg.pinv(model.steps(leg.start, leg.end).Gamma))
         own = (to_accel @ self._guidance.residuals[..., None])[..., 0]
         least = gains.least_thrust * scenario.spacecraft.max_accel_m_s2

@@ -11,7 +11,7 @@ from baselines.controllers.policy import AccelerationPolicy
 from baselines.controllers.weights import Weights
 from baselines.design.guidance import Guidance, Guide, Tracking, desired_path
 from baselines.design.phase_tables import by_steps_left, nominal_start
-from baselines.design.reweighted_lqg import PhaseDesign, expected_cost_design
+from baselines.design.reweighted_lqg import PhaseDesign, reweighted_design
 from baselines.design.riccati import finite_horizon_gains, least_fuel_gains, stationary
 from formation_env.numerics.arrays import Array, Observations
 from formation_env.settings import Flag, NonNegative, Positive, settings
@@ -21,19 +21,19 @@ from formation_env.task.schedule import Leg
 Rounds = Annotated[int, Strict(), Field(ge=0, le=100)]
 
 
-@settings
-class ExpectedCostSettings:
+@settings(renamed={"price_scale": "error_weight_scale"})
+class ReweightedLQGSettings:
     """How the gains of least expected cost are found, see `baselines.design.reweighted_lqg`.
 
     Attributes:
         rounds: how often the weights are renewed.
         floor: smallest thrust that is told from none, in units of max_accel_m_s2.
-        price_scale: factor of the scenario's price of errors.
+        error_weight_scale: factor of the scenario's price of errors.
     """
 
     rounds: Rounds = 30
     floor: Positive = 3e-4
-    price_scale: Positive = 1.0
+    error_weight_scale: Positive = 1.0
 
 
 @settings
@@ -54,34 +54,34 @@ class TransferSettings:
     floor: Positive = 3e-3
 
 
-@settings
+@settings(renamed={"expected_cost": "reweighted_lqg"})
 class LQRSettings:
     """Gains of `lqr`.
 
     Attributes:
-        design: `expected_cost`: a gain for each step, from the scenario's own cost; `weights`: from `hold` and
+        design: `reweighted_lqg`: a gain for each step, from the scenario's own cost; `weights`: from `hold` and
             `transfer`.
-        guidance: the desired path, see `baselines.design.guidance`; `expected_cost` finds the way by itself.
+        guidance: the desired path, see `baselines.design.guidance`; `reweighted_lqg` finds the way by itself.
         feedforward: whether the thrust that the desired path itself takes is added.
-        deadband: design `expected_cost`: the follower coasts while a thrust would take off less than this times itself
+        deadband: design `reweighted_lqg`: the follower coasts while a thrust would take off less than this times itself
             from the cost to come; 0 is none, 1 is what thrust costs.
-        expected_cost: for that design.
+        reweighted_lqg: for that design.
         hold: weights in hold.
         transfer: how transfers are flown.
     """
 
-    design: Literal["expected_cost", "weights"] = "expected_cost"
+    design: Literal["reweighted_lqg", "weights"] = "reweighted_lqg"
     guidance: Guide = "automatic"
     feedforward: Flag = True
     deadband: NonNegative = 0.0
-    expected_cost: ExpectedCostSettings = ExpectedCostSettings()
+    reweighted_lqg: ReweightedLQGSettings = ReweightedLQGSettings()
     hold: Weights = Weights(velocity_s2=(1e5, 1e5, 1e5), control_s2=(3e5, 3e5, 3e5))
     transfer: TransferSettings = TransferSettings()
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        if self.design == "expected_cost" and self.guidance != "automatic":
-            raise ValueError(f"guidance: must be automatic with design expected_cost, got {self.guidance!r}")
+        if self.design == "reweighted_lqg" and self.guidance != "automatic":
+            raise ValueError(f"guidance: must be automatic with design reweighted_lqg, got {self.guidance!r}")
         if self.design == "weights" and self.deadband > 0:
             raise ValueError(f"deadband: must be 0 with design weights, whose cost has no unit, got {self.deadband:g}")
         return self
@@ -96,7 +96,7 @@ class LQR(AccelerationPolicy):
         super().__init__(scenario)
         self.gains = gains
         self._guidance = Guidance(scenario, gains.guidance)
-        model = scenario.filter_model()
+        model = scenario.filter_dynamics()
         if gains.deadband > 0:
             self._stiffness = by_steps_left(scenario, lambda leg: _design(scenario, gains)[leg.index].stiffness)
         self.K = by_steps_left(scenario, lambda leg: phase_gains(scenario, leg, gains))
@@ -119,7 +119,7 @@ class LQR(AccelerationPolicy):
 
 def phase_gains(scenario: Scenario, leg: Leg, gains: LQRSettings) -> Array:
     """Gains (steps, 3, 6) of a phase, from its beginning on."""
-    if gains.design == "expected_cost":
+    if gains.design == "reweighted_lqg":
         return _design(scenario, gains)[leg.index].gains
     hold = _regulator(scenario, gains.hold)[leg.arrival : leg.end]
     if gains.transfer.horizon == "infinite":
@@ -131,14 +131,14 @@ def phase_gains(scenario: Scenario, leg: Leg, gains: LQRSettings) -> Array:
 
 def _design(scenario: Scenario, gains: LQRSettings) -> tuple[PhaseDesign, ...]:
     """The regulators of least expected cost."""
-    wanted = gains.expected_cost
-    return expected_cost_design(scenario, wanted.rounds, wanted.floor, wanted.price_scale)
+    wanted = gains.reweighted_lqg
+    return reweighted_design(scenario, wanted.rounds, wanted.floor, wanted.error_weight_scale)
 
 
 @lru_cache(maxsize=8)
 def _regulator(scenario: Scenario, weights: Weights) -> Array:
     """Gains (steps, 3, 6) of a regulator without end: one gain, or if the model varies, one for each step."""
-    model, Q, R = scenario.filter_model(), weights.Q(), weights.R(scenario.orbit)
+    model, Q, R = scenario.filter_dynamics(), weights.Q(), weights.R(scenario.orbit)
     steps = scenario.num_steps
     if model.Phi.ndim == 2:
         return np.broadcast_to(stationary(model.Phi, model.Gamma, Q, R)[0], (steps, 3, 6))
@@ -149,7 +149,7 @@ def _regulator(scenario: Scenario, weights: Weights) -> Array:
 @lru_cache(maxsize=64)
 def transfer_gains(scenario: Scenario, leg: Leg, guidance: Guide, transfer: TransferSettings) -> Array:
     """Gains (steps, 3, 6) of a leg's transfer, from its start on; the weights are renewed for the nominal start."""
-    model = scenario.filter_model().steps(leg.start, leg.arrival)
+    model = scenario.filter_dynamics().steps(leg.start, leg.arrival)
     start = nominal_start(scenario, leg) - desired_path(scenario, leg, guidance)[0]
     R = np.tile(transfer.weights.R(scenario.orbit), (leg.arrival - leg.start, 1, 1))
     limit = scenario.spacecraft.max_accel_m_s2

@@ -5,10 +5,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from baselines.controllers.lqr import ExpectedCostSettings
+from baselines.controllers.lqr import ReweightedLQGSettings
 from baselines.controllers.policy import AccelerationPolicy
 from baselines.design.phase_tables import by_steps_left, read_instants
-from baselines.design.reweighted_lqg import expected_cost_gains
+from baselines.design.reweighted_lqg import reweighted_gains
 from baselines.optimal import OptimalPlan, fuel_optimal
 from formation_env.dynamics.perturbations import Perturbations
 from formation_env.numerics.arrays import Array, Observations
@@ -17,19 +17,19 @@ from formation_env.task.observation import observation_layout
 from formation_env.task.scenario import Scenario
 
 
-@settings
+@settings(renamed={"expected_cost": "reweighted_lqg"})
 class LQRPlannedSettings:
-    """Gains of `lqr_planned`.
+    """Gains of `lqr_nominal`.
 
     Attributes:
-        expected_cost: how the feedback's gains are found.
+        reweighted_lqg: how the feedback's gains are found.
     """
 
-    expected_cost: ExpectedCostSettings = ExpectedCostSettings()
+    reweighted_lqg: ReweightedLQGSettings = ReweightedLQGSettings()
 
 
-class LQRPlanned(AccelerationPolicy):
-    """u = u_p - K (x_hat - x_p) about the plan x_p, u_p; K as of `lqr` with design `expected_cost`.
+class LQRNominal(AccelerationPolicy):
+    """u = u_p - K (x_hat - x_p) about the plan x_p, u_p; K as of `lqr` with design `reweighted_lqg`.
 
     `lqr` designs each phase by itself; the plan knows what comes after, and where it pays to be when a phase ends.
     """
@@ -45,8 +45,8 @@ class LQRPlanned(AccelerationPolicy):
         super().__init__(scenario)
         self.gains = gains
         self._layout = observation_layout(scenario)
-        plan, wanted = mission_plan(scenario), gains.expected_cost
-        K = expected_cost_gains(scenario, wanted.rounds, wanted.floor, wanted.price_scale)
+        plan, wanted = mission_plan(scenario), gains.reweighted_lqg
+        K = reweighted_gains(scenario, wanted.rounds, wanted.floor, wanted.error_weight_scale)
         self._path = by_steps_left(scenario, lambda leg: plan.states[leg.start : leg.end])
         self._thrust = by_steps_left(scenario, lambda leg: plan.controls[leg.start : leg.end])
         self._K = by_steps_left(scenario, lambda leg: K[leg.index])
@@ -67,12 +67,14 @@ def mission_plan(scenario: Scenario) -> OptimalPlan:
     Raises:
         ModuleNotFoundError: Clarabel is not installed.
     """
-    belief = scenario.belief
+    filter_model = scenario.filter_model
     believed = replace(
         scenario,
-        dynamics=belief.dynamics,
-        orbit=belief.orbit,
-        spacecraft=replace(belief.spacecraft, max_accel_m_s2=scenario.spacecraft.max_accel_m_s2, thrust_noise=0.0),
+        dynamics=filter_model.dynamics,
+        orbit=filter_model.orbit,
+        spacecraft=replace(
+            filter_model.spacecraft, max_accel_m_s2=scenario.spacecraft.max_accel_m_s2, thrust_noise=0.0
+        ),
         perturbations=Perturbations(),
     )
     return fuel_optimal(believed)

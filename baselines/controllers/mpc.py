@@ -24,30 +24,38 @@ _UNIT_M = 100.0
 """Unit of lengths inside the cone program."""
 
 
-@settings
+@settings(
+    renamed={
+        "horizon_periods": "horizon_orbits",
+        "finest_periods": "finest_orbits",
+        "coarsest_periods": "coarsest_orbits",
+        "price_scale": "error_weight_scale",
+        "arrival_price": "arrival_weight",
+    }
+)
 class MPCSettings:
     """Settings of `mpc`.
 
     Attributes:
-        horizon_periods: hold time that a plan looks ahead, in orbital periods; transfers on the way come on top.
-        finest_periods: length of a plan's first blocks of constant thrust, in orbital periods; at least a step.
-        coarsest_periods: length of its last blocks; if shorter than the first, all are as long as the first.
+        horizon_orbits: hold time that a plan looks ahead, in orbital periods; transfers on the way come on top.
+        finest_orbits: length of a plan's first blocks of constant thrust, in orbital periods; at least a step.
+        coarsest_orbits: length of its last blocks; if shorter than the first, all are as long as the first.
         growth: length of a block over its time from now, between the two.
-        price_scale: factor of the scenario's price of errors.
+        error_weight_scale: factor of the scenario's price of errors.
         error_scatter: factor of how far errors are expected to scatter about the plan.
         thrust_scatter: the same for the thrust.
-        arrival_price: extra price of the position error at the arrivals, (m/s) per m. From some price on, 1 in the
+        arrival_weight: extra price of the position error at the arrivals, (m/s) per m. From some price on, 1 in the
             shipped scenarios, the arrival is a constraint: exact, where the thrust suffices, else as near as it gets.
     """
 
-    horizon_periods: Positive = 1.0
-    finest_periods: Positive = 0.005
-    coarsest_periods: Positive = 0.025
+    horizon_orbits: Positive = 1.0
+    finest_orbits: Positive = 0.005
+    coarsest_orbits: Positive = 0.025
     growth: NonNegative = 0.15
-    price_scale: Positive = 1.0
+    error_weight_scale: Positive = 1.0
     error_scatter: NonNegative = 1.0
     thrust_scatter: NonNegative = 0.5
-    arrival_price: NonNegative = 0.0
+    arrival_weight: NonNegative = 0.0
 
 
 class MPC(AccelerationPolicy):
@@ -62,11 +70,11 @@ class MPC(AccelerationPolicy):
         super().__init__(scenario)
         self.gains = gains
         self._legs, self._layout = legs(scenario), observation_layout(scenario)
-        self._model, self._spans = scenario.filter_model(), dict[tuple[int, int], DiscreteModel]()
+        self._model, self._spans = scenario.filter_dynamics(), dict[tuple[int, int], DiscreteModel]()
         table = build_schedule(scenario)
         self._place = columns(table, "scored_position")
-        self._price = gains.price_scale * column(table, "error_price")
-        self._price[[leg.arrival for leg in self._legs if leg.arrival > leg.start]] += gains.arrival_price
+        self._price = gains.error_weight_scale * column(table, "error_weight")
+        self._price[[leg.arrival for leg in self._legs if leg.arrival > leg.start]] += gains.arrival_weight
         # the phase that judges each instant: a phase's beginning belongs to the one before
         self._judge = np.searchsorted([leg.end for leg in self._legs], np.arange(scenario.num_steps + 1))
         self._error_scatter, self._thrust_scatter = self._scatter()
@@ -85,9 +93,9 @@ class MPC(AccelerationPolicy):
     def program(self, instant: int) -> ConeProgram:
         """The program of a plan from an instant on, in steps."""
         gains, scenario, reward = self.gains, self.scenario, self.scenario.reward
-        last = horizon_end(self._legs, instant, max(1, scenario.steps(gains.horizon_periods)))
-        finest = max(1, scenario.steps(gains.finest_periods))
-        coarsest = max(finest, scenario.steps(gains.coarsest_periods))
+        last = horizon_end(self._legs, instant, max(1, scenario.steps(gains.horizon_orbits)))
+        finest = max(1, scenario.steps(gains.finest_orbits))
+        coarsest = max(finest, scenario.steps(gains.coarsest_orbits))
         nodes = block_ends(self._legs, instant, last, finest, coarsest, gains.growth)
         spans = [self._span(start, end) for start, end in zip(nodes[:-1].tolist(), nodes[1:].tolist(), strict=True)]
         horizon = Horizon(
@@ -100,7 +108,7 @@ class MPC(AccelerationPolicy):
             error_scatter_m=self._error_scatter[nodes[1:]],
             thrust_scatter_m_s2=self._thrust_ahead(nodes),
             limit_m_s2=self._max_accel_m_s2,
-            steepness_per_m=1 / reward.quadratic_scale_m if reward.shape == "quadratic" else None,
+            steepness_per_m=1 / reward.quadratic_scale_m if reward.error_cost == "quadratic" else None,
         )
         return ConeProgram(horizon, _UNIT_M, _UNIT_M * scenario.orbit.mean_motion_rad_s)
 

@@ -8,8 +8,8 @@ from typing import Any, Final
 from baselines.controllers.deadband import Deadband
 from baselines.controllers.lqr import LQR
 from baselines.controllers.lqr_finite import LQRFinite
-from baselines.controllers.lqr_nominal import LQRPlanned
-from baselines.controllers.lqr_tracking import LQRTracking
+from baselines.controllers.lqr_nominal import LQRNominal
+from baselines.controllers.lqr_quasi_static import LQRQuasiStatic
 from baselines.controllers.mpc import MPC
 from baselines.controllers.policy import AccelerationPolicy
 from baselines.controllers.reference_policies import Random, Zero
@@ -21,10 +21,10 @@ from formation_env.task.scenario import Scenario
 
 POLICIES: Final[dict[str, type[Any]]] = {
     "lqr": LQR,
-    "lqr_planned": LQRPlanned,
+    "lqr_nominal": LQRNominal,
     "mpc": MPC,
     "lqr_finite": LQRFinite,
-    "lqr_tracking": LQRTracking,
+    "lqr_quasi_static": LQRQuasiStatic,
     "smc": SMC,
     "two_impulse": TwoImpulsePolicy,
     "deadband": Deadband,
@@ -34,7 +34,7 @@ POLICIES: Final[dict[str, type[Any]]] = {
 """Classes made with (scenario, gains), the gains being of the class's `Settings`."""
 SOLVER: Final = "clarabel"
 """The library that solves cone programs, of the extra `optimal`."""
-PLANNING: Final = ("mpc", "lqr_planned")
+PLANNING: Final = ("mpc", "lqr_nominal")
 """Those that need it."""
 SLOW: Final = ("mpc",)
 """Those that solve a program at each step: a hundred times as long as the others."""

@@ -39,7 +39,7 @@ class SMC(AccelerationPolicy):
         super().__init__(scenario)
         self.gains = gains
         self._guidance = Guidance(scenario, gains.guidance)
-        model = scenario.filter_model()
+        model = scenario.filter_dynamics()
         first = model.steps(0, 1)
         self.Ce = gains.surface.Ce(DiscreteModel(first.Phi[0], first.Gamma[0], first.delta[0]), scenario.dt_s)
         self._path = self._guidance.residuals @ self.Ce.T

@@ -47,7 +47,7 @@ class TwoImpulsePolicy(AccelerationPolicy):
         """Accelerations (..., 3), m/s^2, along the wanted impulse even at the limit."""
         now = self._guidance.track(observation)
         in_hold = self._layout.scalar(observation, "in_hold") > 0.5
-        arrival = self._layout.state(observation, "arrival_error")
+        arrival = self._layout.state(observation, "zero_effort_miss")
         first = self._course.impulse(arrival[..., :3], now.at)
         off = self._course.is_off(arrival[..., :3], observation, now.at)
         brakes = self._layout.time_to_arrival_s(observation) <= self._braking_s(arrival[..., 3:])

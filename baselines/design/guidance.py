@@ -5,7 +5,7 @@
 - `two_impulse`: to the arrival on the coasting path between two impulses, `transfers.two_impulse`;
 - `hohmann`: the same, but half a period after the start it is on the reference and stays there (section 3.2.1);
 - `least_fuel`: to the arrival on the path of few burns that `riccati.least_fuel_gains` finds for the nominal start;
-- `least_cost`: through the whole phase on the mean path of `expected_cost`, which may settle after the arrival.
+- `least_cost`: through the whole phase on the mean path of `reweighted_lqg`, which may settle after the arrival.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from baselines.design.phase_tables import (
     start_error,
     transfer_reference,
 )
-from baselines.design.reweighted_lqg import expected_cost_gains
+from baselines.design.reweighted_lqg import reweighted_gains
 from baselines.design.riccati import closed_loop, least_fuel_gains
 from baselines.design.transfers import two_impulse
 from formation_env.dynamics.base import DiscreteModel
@@ -93,7 +93,7 @@ def desired_states(scenario: Scenario, leg: Leg, guide: Guide) -> Array:
 
 def _residual(scenario: Scenario, leg: Leg, desired: Array) -> Array:
     """x_d(k+1) - Phi x_d(k) - delta of each step of a phase (steps, 6)."""
-    model = scenario.filter_model().steps(leg.start, leg.end)
+    model = scenario.filter_dynamics().steps(leg.start, leg.end)
     return desired[1:] - (model.Phi @ desired[:-1, :, None])[..., 0] - model.delta
 
 
@@ -142,8 +142,8 @@ def hohmann_path(scenario: Scenario, leg: Leg) -> Array:
     """
     key, meeting = f"guidance: hohmann: phases.{leg.index}", leg.start + scenario.steps(0.5)
     if meeting > leg.arrival:
-        given = leg.phase.transfer_periods
-        raise ConfigError(f"{key}.transfer_periods: must be at least 0.5, half a period, got {given:g}")
+        given = leg.phase.transfer_orbits
+        raise ConfigError(f"{key}.transfer_orbits: must be at least 0.5, half a period, got {given:g}")
     off_plane_m = np.hypot(*(start_error(scenario, leg)[[2, 5]] / [1, scenario.orbit.mean_motion_rad_s]))
     if off_plane_m > _SAME_PLANE_M:
         raise ConfigError(f"{key}.formation: must be in the plane of the phase's start, is {off_plane_m:.4g} m off it")
@@ -154,13 +154,13 @@ def hohmann_path(scenario: Scenario, leg: Leg) -> Array:
 def _coast_to(scenario: Scenario, leg: Leg, meeting: int) -> Array:
     """Two impulses' path from the nominal start to the reference at a step, states (meeting - leg.start + 1, 6)."""
     time_s = scenario.dt_s * (meeting - leg.start)
-    model = scenario.filter_model().steps(leg.start, meeting).from_start()
+    model = scenario.filter_dynamics().steps(leg.start, meeting).from_start()
     whole = DiscreteModel(model.Phi[-1], model.Gamma[-1], model.delta[-1])
     start, goal = nominal_start(scenario, leg), leg_reference(scenario, leg, np.array(meeting))
     try:
         impulses = two_impulse(whole, time_s, scenario.orbit.mean_motion_rad_s, start, goal)
     except ValueError as error:
-        raise ConfigError(f"guidance: phases.{leg.index}.transfer_periods: {error}") from None
+        raise ConfigError(f"guidance: phases.{leg.index}.transfer_orbits: {error}") from None
     path: Array = model.Phi @ (start + np.concatenate([np.zeros(3), impulses.first_m_s])) + model.delta
     path[-1] = goal
     return path
@@ -169,7 +169,7 @@ def _coast_to(scenario: Scenario, leg: Leg, meeting: int) -> Array:
 @lru_cache(maxsize=64)
 def least_fuel_path(scenario: Scenario, leg: Leg) -> Array:
     """The path of few burns from the nominal start to the arrival by the filter's model, states (steps + 1, 6)."""
-    model = scenario.filter_model().steps(leg.start, leg.arrival)
+    model = scenario.filter_dynamics().steps(leg.start, leg.arrival)
     n = scenario.orbit.mean_motion_rad_s
     start = start_error(scenario, leg)
     R = np.tile(np.eye(3) / n**4, (leg.arrival - leg.start, 1, 1))
@@ -184,8 +184,8 @@ def least_fuel_path(scenario: Scenario, leg: Leg) -> Array:
 
 def least_cost_path(scenario: Scenario, leg: Leg) -> Array:
     """The mean path of the regulator of least expected cost, states (steps + 1, 6) over the whole phase."""
-    model = scenario.filter_model().steps(leg.start, leg.end)
-    gains = expected_cost_gains(scenario)[leg.index]
+    model = scenario.filter_dynamics().steps(leg.start, leg.end)
+    gains = reweighted_gains(scenario)[leg.index]
     reference = leg_reference(scenario, leg, np.arange(leg.start, leg.end + 1))
     return reference + closed_loop(model.Phi, model.Gamma, gains, start_error(scenario, leg))[0]
 

@@ -68,7 +68,7 @@ def sigmas(shown: Array, unit: float) -> Array:
 
 def to_arrival(scenario: Scenario, leg: Leg) -> Array:
     """Phi from each instant of a transfer to its arrival (steps, 6, 6)."""
-    Phi = scenario.filter_model().steps(leg.start, leg.arrival).from_start().Phi
+    Phi = scenario.filter_dynamics().steps(leg.start, leg.arrival).from_start().Phi
     return Phi[-1] @ np.linalg.inv(Phi[:-1])
 
 

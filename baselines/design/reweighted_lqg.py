@@ -46,11 +46,11 @@ class Knowledge:
 
 def knowledge(scenario: Scenario, model: DiscreteModel) -> Knowledge:
     """The filter's covariances over an episode in which all measurements arrive (Ma 2009, eq. 4.71-4.75)."""
-    belief, start = scenario.belief, scenario.start
+    filter_model, start = scenario.filter_model, scenario.start
     H, R_noise = measurement(scenario)
-    P = np.diag(np.repeat([start.spread_pos_m, start.spread_vel_m_s], 3) ** 2)
+    P = np.diag(np.repeat([start.initial_sigma_pos_m, start.initial_sigma_vel_m_s], 3) ** 2)
     model = model.steps(0, scenario.num_steps)
-    Q_noise = process_noise_covariance(model.Gamma, belief.process_noise_m_s2)
+    Q_noise = process_noise_covariance(model.Gamma, filter_model.process_noise_m_s2)
     missed, learned = np.zeros((2, scenario.num_steps + 1, 6, 6))
     for step in range(scenario.num_steps + 1):
         S = H @ P @ H.T + R_noise
@@ -126,16 +126,16 @@ class PhaseDesign:
     stiffness: Array
 
 
-def expected_cost_gains(
-    scenario: Scenario, rounds: int = 30, floor: float = 3e-4, price_scale: float = 1.0
+def reweighted_gains(
+    scenario: Scenario, rounds: int = 30, floor: float = 3e-4, error_weight_scale: float = 1.0
 ) -> tuple[Array, ...]:
-    """Gains (steps, 3, 6) of each phase, see `expected_cost_design`."""
-    return tuple(design.gains for design in expected_cost_design(scenario, rounds, floor, price_scale))
+    """Gains (steps, 3, 6) of each phase, see `reweighted_design`."""
+    return tuple(design.gains for design in reweighted_design(scenario, rounds, floor, error_weight_scale))
 
 
 @lru_cache(maxsize=32)
-def expected_cost_design(
-    scenario: Scenario, rounds: int = 30, floor: float = 3e-4, price_scale: float = 1.0
+def reweighted_design(
+    scenario: Scenario, rounds: int = 30, floor: float = 3e-4, error_weight_scale: float = 1.0
 ) -> tuple[PhaseDesign, ...]:
     """The regulator of each phase.
 
@@ -145,15 +145,15 @@ def expected_cost_design(
         scenario: what is flown.
         rounds: how often the weights are renewed.
         floor: smallest thrust that is told from none, in units of max_accel_m_s2.
-        price_scale: factor of the scenario's price of errors.
+        error_weight_scale: factor of the scenario's price of errors.
     """
-    known = knowledge(scenario, scenario.filter_model())
+    known = knowledge(scenario, scenario.filter_dynamics())
     first, result = known.learned[0], []
     for leg in legs(scenario):
         instants = slice(leg.start, leg.end + 1)
         here = Knowledge(known.missed[instants], known.learned[instants])
         start = start_error(scenario, leg)
-        design, first = _design(scenario, leg, start, first, here, rounds, floor, price_scale)
+        design, first = _design(scenario, leg, start, first, here, rounds, floor, error_weight_scale)
         for part in (design.gains, design.stiffness):
             part.setflags(write=False)
         result.append(design)
@@ -168,12 +168,12 @@ def _design(
     known: Knowledge,
     rounds: int,
     floor: float,
-    price_scale: float,
+    error_weight_scale: float,
 ) -> tuple[PhaseDesign, Array]:
     """The regulator of a phase, and the second moment (6, 6) of the estimated error at its end."""
     limit, position = scenario.spacecraft.max_accel_m_s2, np.diag([1.0, 1, 1, 0, 0, 0])
-    model = scenario.filter_model().steps(leg.start, leg.end)
-    price = price_scale * _error_price(scenario, leg)
+    model = scenario.filter_dynamics().steps(leg.start, leg.end)
+    price = error_weight_scale * _error_price(scenario, leg)
     control_weight, error_weight = np.full(leg.end - leg.start, scenario.dt_s / limit), price / FIRST_ERROR_M
     for _ in range(rounds + 1):
         Q, R = error_weight[:, None, None] * position, control_weight[:, None, None] * np.eye(3)
@@ -195,22 +195,22 @@ def _error_price(scenario: Scenario, leg: Leg) -> Array:
 
 def _steepness(scenario: Scenario, error_m: Array) -> Array:
     """Cost per price and squared error (...), 1/m."""
-    if scenario.reward.shape == "quadratic":
+    if scenario.reward.error_cost == "quadratic":
         return np.full(error_m.shape, 1 / scenario.reward.quadratic_scale_m)
     return 1 / (error_m + ERROR_FLOOR_M)
 
 
 def episode_scatter(scenario: Scenario) -> tuple[Array, Array]:
-    """How far an episode scatters about its mean under `expected_cost_gains`.
+    """How far an episode scatters about its mean under `reweighted_gains`.
 
     Returns:
         Root mean squares of the true position error (num_steps + 1,), m, and of the acceleration (num_steps,), m/s^2.
     """
-    known = knowledge(scenario, scenario.filter_model())
+    known = knowledge(scenario, scenario.filter_dynamics())
     first, error, control = known.learned[0], np.zeros(scenario.num_steps + 1), np.zeros(scenario.num_steps)
-    for leg, gains in zip(legs(scenario), expected_cost_gains(scenario), strict=True):
+    for leg, gains in zip(legs(scenario), reweighted_gains(scenario), strict=True):
         instants = slice(leg.start, leg.end + 1)
         here = Knowledge(known.missed[instants], known.learned[instants])
-        seen = spread(scenario.filter_model().steps(leg.start, leg.end), gains, np.zeros(6), first, here)
+        seen = spread(scenario.filter_dynamics().steps(leg.start, leg.end), gains, np.zeros(6), first, here)
         error[instants], control[leg.start : leg.end], first = seen.error, seen.control, seen.last
     return error, control

@@ -19,18 +19,18 @@ _DAMPING = 1e-3
 """Of an impulse, against the squared leverage that it has over a whole window; lest short windows ask for much."""
 
 
-@settings
+@settings(renamed={"look_ahead_periods": "look_ahead_orbits"})
 class KeepingSettings:
     """A deadband on the predicted error.
 
     Attributes:
         band_m: root mean square of the position error over the time to come that coasting may lead to, m.
-        look_ahead_periods: the time to come, in orbital periods; it ends with the phase.
+        look_ahead_orbits: the time to come, in orbital periods; it ends with the phase.
         least_reduction: share of that error which an impulse must take away, else it waits for a better place.
     """
 
     band_m: Positive = 15.0
-    look_ahead_periods: Positive = 0.5
+    look_ahead_orbits: Positive = 0.5
     least_reduction: Annotated[Real, Field(ge=0, lt=1)] = 0.3
 
 
@@ -38,11 +38,11 @@ class Keeping:
     """A memoryless law of holds: from the estimated error to a rare impulse."""
 
     def __init__(self, scenario: Scenario, gains: KeepingSettings) -> None:
-        self._gains, self._window = gains, max(1, scenario.steps(gains.look_ahead_periods))
+        self._gains, self._window = gains, max(1, scenario.steps(gains.look_ahead_orbits))
         self._A = by_steps_left(scenario, lambda leg: error_steps(scenario, leg))
         # the impulse acts over the step, so what counts is the sum from the step's end on
         self._M = by_steps_left(scenario, lambda leg: coasting_sums(error_steps(scenario, leg), self._window)[1:])
-        self._Gamma = by_steps_left(scenario, lambda leg: scenario.filter_model().steps(leg.start, leg.end).Gamma)
+        self._Gamma = by_steps_left(scenario, lambda leg: scenario.filter_dynamics().steps(leg.start, leg.end).Gamma)
 
     def acceleration(self, error: Array, at: Instants) -> Array:
         """Accelerations (..., 3), m/s^2, not cut to the limit; zero in a coast.
@@ -79,7 +79,7 @@ def _times(matrix: Array, vector: Array) -> Array:
 
 def error_steps(scenario: Scenario, leg: Leg) -> Array:
     """A of each step of a phase (steps, 7, 7): (e, 1) -> (Phi e + what the reference lacks to be natural, 1)."""
-    model = scenario.filter_model().steps(leg.start, leg.end)
+    model = scenario.filter_dynamics().steps(leg.start, leg.end)
     reference = leg_reference(scenario, leg, np.arange(leg.start, leg.end + 1))
     A = np.zeros((leg.end - leg.start, 7, 7))
     A[:, :6, :6] = model.Phi

@@ -30,7 +30,7 @@ class StationaryFilter:
 def measurement(scenario: Scenario) -> tuple[Array, Array]:
     """H (m, 6) of the sensor and R_noise (m, m) as the filter believes it."""
     H = np.eye(6) if scenario.sensor.measures == "position_and_velocity" else np.eye(3, 6)
-    sigma = np.repeat([scenario.belief.sigma_pos_m, scenario.belief.sigma_vel_m_s], 3)[: len(H)]
+    sigma = np.repeat([scenario.filter_model.sigma_pos_m, scenario.filter_model.sigma_vel_m_s], 3)[: len(H)]
     return H, np.diag(sigma**2)
 
 
@@ -43,14 +43,14 @@ def stationary_filter(scenario: Scenario) -> StationaryFilter:
         ValueError: there is no noise, in the process or in the sensor, or the model varies; then nothing settles, or
             at zero.
     """
-    belief, model = scenario.belief, scenario.filter_model()
+    filter_model, model = scenario.filter_model, scenario.filter_dynamics()
     if model.Phi.ndim == 3:
-        raise ValueError(f"filter.dynamics: must be a model that does not vary, got {belief.dynamics}")
+        raise ValueError(f"filter.dynamics: must be a model that does not vary, got {filter_model.dynamics}")
     H, R_noise = measurement(scenario)
-    for key, value in (("process_noise_m_s2", belief.process_noise_m_s2), ("sigma", R_noise.diagonal().min())):
+    for key, value in (("process_noise_m_s2", filter_model.process_noise_m_s2), ("sigma", R_noise.diagonal().min())):
         if value <= 0:
             raise ValueError(f"{key}: must be > 0 for a stationary filter, got {value:g}")
     # python-control's gain is that of the predictor, Phi K
-    L, predicted, _ = control.dlqe(model.Phi, model.Gamma, H, belief.process_noise_m_s2**2 * np.eye(3), R_noise)
+    L, predicted, _ = control.dlqe(model.Phi, model.Gamma, H, filter_model.process_noise_m_s2**2 * np.eye(3), R_noise)
     gain = np.linalg.solve(model.Phi, np.asarray(L))
     return StationaryFilter(gain, np.asarray(predicted), (np.eye(6) - gain @ H) @ predicted)

@@ -66,7 +66,7 @@ def _bursts(scenario: Scenario, mean_outage_s: float, share: float) -> Scenario:
     # share = outage / (outage + between)
     between_s = mean_outage_s * (1 - share) / share
     periods = between_s / scenario.orbit.period_s
-    return replace(scenario, dropout=GilbertElliott(mean_outage_s=mean_outage_s, mean_between_periods=periods))
+    return replace(scenario, dropout=GilbertElliott(mean_outage_s=mean_outage_s, mean_uptime_orbits=periods))
 
 
 def sensor_noise(scenario: Scenario, factor: float) -> Pair:
@@ -84,20 +84,23 @@ def thrust_limit(scenario: Scenario, factor: float) -> Pair:
 def initial_error(scenario: Scenario, factor: float) -> Pair:
     """Spread of the start, in units of the scenario's."""
     known = scenario.start
-    spread = {"spread_pos_m": factor * known.spread_pos_m, "spread_vel_m_s": factor * known.spread_vel_m_s}
+    spread = {
+        "initial_sigma_pos_m": factor * known.initial_sigma_pos_m,
+        "initial_sigma_vel_m_s": factor * known.initial_sigma_vel_m_s,
+    }
     return _told(replace(scenario, start=replace(known, **spread)))
 
 
 def true_dynamics(scenario: Scenario, nonlinear: float) -> Pair:
     """The filter's linear model as the truth (0), or the nonlinear one (1)."""
-    return replace(scenario, dynamics=NONLINEAR if nonlinear else scenario.belief.dynamics), scenario
+    return replace(scenario, dynamics=NONLINEAR if nonlinear else scenario.filter_model.dynamics), scenario
 
 
 def ballistic_coefficient(scenario: Scenario, percent: float) -> Pair:
     """The follower's ballistic coefficient m / (C_d S) off by so many per cent; leader and filter stay as they were."""
     known = scenario.spacecraft
     true = replace(known, area_m2=known.area_m2 / (1 + percent / 100))
-    believed = replace(scenario.filter, spacecraft=scenario.belief.spacecraft)
+    believed = replace(scenario.filter, spacecraft=scenario.filter_model.spacecraft)
     return replace(scenario, spacecraft=true, leader_spacecraft=scenario.leader, filter=believed), scenario
 
 

@@ -85,7 +85,7 @@ def _transfer(scenario: Scenario, phase: int) -> Leg:
     if not 0 <= phase < len(plan):
         raise ValueError(f"phase: must be between 0 and {len(plan) - 1}, got {phase}")
     if plan[phase].arrival == plan[phase].start:
-        raise ValueError(f"phase: must have transfer_periods > 0, phase {phase} has none")
+        raise ValueError(f"phase: must have transfer_orbits > 0, phase {phase} has none")
     return plan[phase]
 
 

@@ -75,7 +75,7 @@ def episode_problem(
     start = start_of(scenario, legs(scenario)[0], initial_state)
     if seed is not None and initial_state is not None:
         raise ValueError(f"initial_state: give it or a seed, not both; got seed = {seed}")
-    model, shape = scenario.true_model().steps(0, scenario.num_steps), scenario.reward.shape
+    model, shape = scenario.true_dynamics().steps(0, scenario.num_steps), scenario.reward.error_cost
     if seed is None:
         free_path, gains = _coast(scenario, start), np.ones(scenario.num_steps)
     else:
@@ -121,7 +121,7 @@ def start_of(scenario: Scenario, leg: Leg, initial_state: ArrayLike | None) -> A
 
 def _coast(scenario: Scenario, start: Array) -> Array:
     """States (steps + 1, 6) without thrust and noise."""
-    path = scenario.true_model().steps(0, scenario.num_steps).from_start()
+    path = scenario.true_dynamics().steps(0, scenario.num_steps).from_start()
     return np.asarray(path.Phi @ start + path.delta)
 
 
@@ -149,14 +149,14 @@ def _scores(scenario: Scenario) -> tuple[Array, Array]:
     table = build_schedule(scenario)
     goal = np.zeros((len(table), 6))
     goal[:, :3] = columns(table, "scored_position")
-    return goal, column(table, "error_price").copy()
+    return goal, column(table, "error_weight").copy()
 
 
 def _meet(scenario: Scenario, goal: Array) -> tuple[int, ...]:
     """The instants at which transfers end, and begin after a hold; their reference states (6,) are put into `goal`."""
     transfers = [leg for leg in legs(scenario) if leg.arrival > leg.start]
     if not transfers:
-        raise ValueError("exact_arrival: the scenario has no phase with transfer_periods > 0 to arrive from")
+        raise ValueError("exact_arrival: the scenario has no phase with transfer_orbits > 0 to arrive from")
     plan, met = legs(scenario), []
     for leg in transfers:
         if leg.index > 0:

@@ -132,7 +132,7 @@ def _add_views(figure: go.Figure, results: Results, x: dict[str, np.ndarray], y:
 def equal_cost_lines(reward: Reward, x: Scale, y: Scale) -> Iterable[go.Scatter]:
     """Lines of delta-v + weight * mean error = cost; none where the reward is of another form."""
     weight = reward.error_weight
-    if reward.shape != "linear" or reward.transfer_error_weight > 0 or weight <= 0:
+    if reward.error_cost != "linear" or reward.transfer_error_weight > 0 or weight <= 0:
         return
     for cost in round_values(max(x.low, 0) + weight * max(y.low, 0), x.high + weight * y.high):
         thrust = x.grid(cost)

@@ -34,10 +34,10 @@ class Look:
 # and on light. They do not go round, so symbols differ everywhere, and dashes where two colours may be mistaken.
 _FIXED: Final = {
     "lqr": Look("#0072B2", "circle", "solid"),
-    "lqr_planned": Look("#332288", "hexagram", "dashdot"),
+    "lqr_nominal": Look("#332288", "hexagram", "dashdot"),
     "mpc": Look("#AA3377", "star", "solid"),
     "lqr_finite": Look("#7B6FD0", "diamond", "dot"),
-    "lqr_tracking": Look("#56B4E9", "square", "dash"),
+    "lqr_quasi_static": Look("#56B4E9", "square", "dash"),
     "smc": Look("#D55E00", "triangle-up", "solid"),
     "two_impulse": Look("#CC79A7", "triangle-down", "solid"),
     "deadband": Look("#8C6D1F", "pentagon", "dash"),

@@ -16,12 +16,12 @@ from formation_env.task.scenario import Scenario
 
 DYNAMICS: Final = "printed_hcw"
 """Of every flight with noise that does not say otherwise."""
-INITIALIZATION: Final = Law("lqr_tracking", "thesis_initialization")
+INITIALIZATION: Final = Law("lqr_quasi_static", "thesis_initialization")
 LQR: Final = Law("lqr", "thesis_keeping")
 FINER_S2: Final = 4150.0
 """Factor a, a third of the printed one, with which the greatest error is the 175 m of Figure 5.9, s^2."""
 FINER: Final = Law("lqr", "thesis_keeping", FINER_S2)
-TRACKING: Final = Law("lqr_tracking", "thesis_keeping")
+TRACKING: Final = Law("lqr_quasi_static", "thesis_keeping")
 SMC: Final = Law("smc", "thesis_keeping")
 SWEEP_S2: Final = (100.0, 300.0, 1000.0, 40000.0, 100000.0, 200000.0)
 """Factors a of the control weight a I / n^2 that, with those of the laws above, reach Figure 5.10's accuracies, s^2."""

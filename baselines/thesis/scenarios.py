@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from baselines.controllers.lqr import LQRSettings
-from baselines.controllers.lqr_tracking import LQRTrackingSettings
+from baselines.controllers.lqr_quasi_static import LQRTrackingSettings
 from baselines.controllers.policy import AccelerationPolicy
 from baselines.controllers.registry import make_policy, read_gains
 from baselines.controllers.weights import Weights
@@ -37,15 +37,15 @@ def _one_step(scenario: Scenario) -> float:
     return scenario.dt_s / scenario.orbit.period_s
 
 
-def initialization(transfer_periods: float = 0.5, dt_s: float | None = None) -> Scenario:
+def initialization(transfer_orbits: float = 0.5, dt_s: float | None = None) -> Scenario:
     """Section 5.2.1: from the leader to 2000 m ahead of it, without noise; it ends a step after the arrival.
 
     Args:
-        transfer_periods: transfer time, in periods of the orbit.
+        transfer_orbits: transfer time, in periods of the orbit.
         dt_s: time step, s; the shipped scenario's if left out.
     """
     scenario = _shipped("thesis_initialization", dt_s)
-    phase = replace(scenario.phases[0], transfer_periods=transfer_periods, hold_periods=_one_step(scenario))
+    phase = replace(scenario.phases[0], transfer_orbits=transfer_orbits, hold_orbits=_one_step(scenario))
     return replace(scenario, phases=(phase,))
 
 
@@ -57,7 +57,7 @@ def keeping(periods: float = 10.0, dt_s: float | None = None) -> Scenario:
         dt_s: time step, s; the shipped scenario's if left out.
     """
     scenario = _shipped("thesis_keeping", dt_s)
-    return replace(scenario, phases=(replace(scenario.phases[0], hold_periods=periods),))
+    return replace(scenario, phases=(replace(scenario.phases[0], hold_orbits=periods),))
 
 
 def keeping_failure(
@@ -90,7 +90,7 @@ def reconfiguration(
     """
     scenario = _shipped("thesis_reconfiguration", dt_s)
     start = replace(scenario.start, formation=Following(y0_m=y0_m))
-    return replace(scenario, start=start, phases=(Phase(formation=entry, hold_periods=periods),))
+    return replace(scenario, start=start, phases=(Phase(formation=entry, hold_orbits=periods),))
 
 
 def with_velocity(scenario: Scenario, velocity_m_s: Sequence[float]) -> Array:
@@ -110,7 +110,7 @@ def mission(dt_s: float | None = None, entry: ProjectedCircle = ENTRY) -> Scenar
     """
     scenario = _shipped("thesis_mission", dt_s)
     ellipse, circle = (
-        replace(phase, transfer_periods=0.0, hold_periods=phase.transfer_periods + phase.hold_periods)
+        replace(phase, transfer_orbits=0.0, hold_orbits=phase.transfer_orbits + phase.hold_orbits)
         for phase in scenario.phases
     )
     return replace(scenario, phases=(ellipse, replace(circle, formation=entry)))
@@ -120,7 +120,7 @@ def law(name: str, scenario: Scenario, shipped: str, control_s2: float | None = 
     """One of the thesis's control laws with its printed gains.
 
     Args:
-        name: `lqr_tracking` (the thesis's LQR), `lqr` (error-state feedback with the same weights) or `smc`.
+        name: `lqr_quasi_static` (the thesis's LQR), `lqr` (error-state feedback with the same weights) or `smc`.
         scenario: what it flies.
         shipped: whose gains: a file in configs/baselines, such as `thesis_keeping`.
         control_s2: factor a of the control weight R = a I / n^2 in place of the printed one, s^2.

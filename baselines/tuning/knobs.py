@@ -53,19 +53,19 @@ _CORRECTION: Final = (
 )
 _KEEPING: Final = (
     Knob(("keeping.band_m",), 0.5, 200),
-    Knob(("keeping.look_ahead_periods",), 0.05, 2),
+    Knob(("keeping.look_ahead_orbits",), 0.05, 2),
     Knob(("keeping.least_reduction",), 0, 0.95, log=False),
 )
 
 KNOBS: Final[dict[str, tuple[Knob, ...]]] = {
     "lqr": (
-        Knob(("expected_cost.floor",), 1e-5, 1e-2),
-        Knob(("expected_cost.price_scale",), 0.3, 3),
+        Knob(("reweighted_lqg.floor",), 1e-5, 1e-2),
+        Knob(("reweighted_lqg.error_weight_scale",), 0.3, 3),
         Knob(("deadband",), 0, 1, log=False),
     ),
-    "lqr_planned": (Knob(("expected_cost.floor",), 1e-5, 1e-2), Knob(("expected_cost.price_scale",), 0.3, 3)),
+    "lqr_nominal": (Knob(("reweighted_lqg.floor",), 1e-5, 1e-2), Knob(("reweighted_lqg.error_weight_scale",), 0.3, 3)),
     "lqr_finite": (*_regulator("transfer", transfer=True), *_regulator("hold", transfer=False)),
-    "lqr_tracking": (*_regulator("transfer", transfer=True), *_regulator("hold", transfer=False)),
+    "lqr_quasi_static": (*_regulator("transfer", transfer=True), *_regulator("hold", transfer=False)),
     "smc": (
         *(Knob((f"surface.decay_per_s.{axis}",), 3e-5, 3e-2) for axis in range(3)),
         Knob(("reaching.eps_m_s",), 1e-4, 1),
@@ -75,7 +75,7 @@ KNOBS: Final[dict[str, tuple[Knob, ...]]] = {
     "two_impulse": (*_CORRECTION, Knob(("braking",), 0, 1.5, log=False, transfer=True), *_KEEPING),
     "deadband": (Knob(("least_thrust",), 1e-3, 0.5, transfer=True), *_CORRECTION, *_KEEPING),
     "mpc": (
-        Knob(("price_scale",), 0.3, 3),
+        Knob(("error_weight_scale",), 0.3, 3),
         Knob(("error_scatter",), 0, 3, log=False),
         Knob(("thrust_scatter",), 0, 2, log=False),
     ),
@@ -85,7 +85,7 @@ KNOBS: Final[dict[str, tuple[Knob, ...]]] = {
 
 def knobs_for(policy: str, scenario: Scenario) -> tuple[Knob, ...]:
     """The knobs of a policy that matter to a scenario."""
-    transfers = any(scenario.steps(phase.transfer_periods) for phase in scenario.phases)
+    transfers = any(scenario.steps(phase.transfer_orbits) for phase in scenario.phases)
     return tuple(knob for knob in KNOBS[policy] if transfers or not knob.transfer)
 
 

@@ -19,8 +19,8 @@ from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import build_schedule
 
 # What the true motion is made of, and the filter's: compile-time constants.
-CONSTANT_MODEL: Final = 0
-VARYING_MODEL: Final = 1
+TIME_INVARIANT: Final = 0
+TIME_VARYING: Final = 1
 NONLINEAR_NEAR: Final = 2  # gravity and drag
 NONLINEAR_FAR: Final = 3  # Sun, Moon and radiation pressure, too
 
@@ -72,7 +72,7 @@ class Scalars(NamedTuple):
     max_accel: float
     min_accel: float
     thrust_noise: float
-    believed_thrust_variance: float
+    filter_thrust_variance: float
     process_noise: float
     sigma_pos: float
     sigma_vel: float
@@ -96,12 +96,12 @@ class Scalars(NamedTuple):
 
 MODEL_SIZE: Final = 36
 PROCESS_SIZE: Final = 13
-BELIEF_SIZE: Final = MODEL_SIZE + PROCESS_SIZE
+FILTER_SIZE: Final = MODEL_SIZE + PROCESS_SIZE
 SENSOR_SIZE: Final = 4
 FORCES_SIZE: Final = len(Forces._fields)
 SCALAR_SIZE: Final = len(Scalars._fields)
-BELIEF: Final = MODEL_SIZE
-_SENSOR: Final = BELIEF + BELIEF_SIZE
+FILTER: Final = MODEL_SIZE
+_SENSOR: Final = FILTER + FILTER_SIZE
 _FORCES: Final = _SENSOR + SENSOR_SIZE
 _SCALARS: Final = _FORCES + FORCES_SIZE
 SIZE: Final = _SCALARS + SCALAR_SIZE
@@ -111,16 +111,16 @@ def truth_kind(scenario: Scenario) -> int:
     """How the true motion comes about."""
     if scenario.dynamics == NONLINEAR:
         return NONLINEAR_FAR if scenario.perturbations.far_bodies else NONLINEAR_NEAR
-    return _linear_kind(scenario.true_model())
+    return _linear_kind(scenario.true_dynamics())
 
 
-def belief_kind(scenario: Scenario) -> int:
+def filter_kind(scenario: Scenario) -> int:
     """Whether the filter's model is the same at all steps."""
-    return _linear_kind(scenario.filter_model())
+    return _linear_kind(scenario.filter_dynamics())
 
 
 def _linear_kind(model: DiscreteModel) -> int:
-    return VARYING_MODEL if model.Phi.ndim == 3 else CONSTANT_MODEL
+    return TIME_VARYING if model.Phi.ndim == 3 else TIME_INVARIANT
 
 
 @lru_cache(maxsize=2)
@@ -142,10 +142,10 @@ def pack(scenario: Scenario) -> Array:
         ValueError: a dynamics model couples the orbit plane and the cross-track axis.
     """
     settings = np.zeros(SIZE)
-    if truth_kind(scenario) == CONSTANT_MODEL:
-        settings[:BELIEF] = _model(scenario.true_model())
-    if belief_kind(scenario) == CONSTANT_MODEL:
-        settings[BELIEF:_SENSOR] = _belief(scenario)
+    if truth_kind(scenario) == TIME_INVARIANT:
+        settings[:FILTER] = _model(scenario.true_dynamics())
+    if filter_kind(scenario) == TIME_INVARIANT:
+        settings[FILTER:_SENSOR] = _filter(scenario)
     settings[_SENSOR:_FORCES] = np.ravel(_sensor(scenario))
     settings[_FORCES:_SCALARS] = _forces(scenario)
     settings[_SCALARS:] = _scalars(scenario)
@@ -159,11 +159,11 @@ def step_table(scenario: Scenario) -> Array:
     `Model`, if that varies, or the leader's path, if the truth is nonlinear.
     """
     columns = []
-    if belief_kind(scenario) == VARYING_MODEL:
-        columns.append(_belief(scenario))
-    if truth_kind(scenario) == VARYING_MODEL:
-        columns.append(_model(scenario.true_model()))
-    elif truth_kind(scenario) != CONSTANT_MODEL:
+    if filter_kind(scenario) == TIME_VARYING:
+        columns.append(_filter(scenario))
+    if truth_kind(scenario) == TIME_VARYING:
+        columns.append(_model(scenario.true_dynamics()))
+    elif truth_kind(scenario) != TIME_INVARIANT:
         columns.append(leader_table(scenario.world, scenario.leader, scenario.dt_s, scenario.num_steps))
     plan = build_schedule(scenario)
     return np.hstack([plan, *(np.vstack([part[:1], part]) for part in columns)])
@@ -172,8 +172,8 @@ def step_table(scenario: Scenario) -> Array:
 @inline_scalar
 def unpack(s: Array) -> tuple[Model, Model, ProcessNoise, SensorNoise, Forces, Scalars]:
     """The settings as tuples of scalars, so that the compiler need not read memory to know them."""
-    truth, belief, process = unpack_model(s, 0, 1), unpack_model(s, BELIEF, 1), unpack_process(s, BELIEF, 1)
-    return truth, belief, process, unpack_sensor(s, 0, 1), unpack_forces(s, 0, 1), unpack_scalars(s, 0, 1)
+    truth, filter_model, process = unpack_model(s, 0, 1), unpack_model(s, FILTER, 1), unpack_process(s, FILTER, 1)
+    return truth, filter_model, process, unpack_sensor(s, 0, 1), unpack_forces(s, 0, 1), unpack_scalars(s, 0, 1)
 
 
 @inline_scalar
@@ -243,10 +243,10 @@ def _model(model: DiscreteModel) -> Array:
     return np.concatenate(parts, axis=-1)
 
 
-def _belief(scenario: Scenario) -> Array:
-    """Numbers (..., BELIEF_SIZE) of the filter's model and process noise."""
-    model = scenario.filter_model()
-    Q_noise = process_noise_covariance(model.Gamma, scenario.belief.process_noise_m_s2)
+def _filter(scenario: Scenario) -> Array:
+    """Numbers (..., FILTER_SIZE) of the filter's model and process noise."""
+    model = scenario.filter_dynamics()
+    Q_noise = process_noise_covariance(model.Gamma, scenario.filter_model.process_noise_m_s2)
     noise = ProcessNoise(
         Q_in_plane=upper_triangle(Q_noise[..., IN_PLANE[:, None], IN_PLANE]),
         Q_cross_track=upper_triangle(Q_noise[..., CROSS_TRACK[:, None], CROSS_TRACK]),
@@ -255,7 +255,7 @@ def _belief(scenario: Scenario) -> Array:
 
 
 def _sensor(scenario: Scenario) -> SensorNoise:
-    believed = scenario.belief
+    believed = scenario.filter_model
     return SensorNoise(
         variances=(believed.sigma_pos_m**2, believed.sigma_vel_m_s**2),
         measures=(1.0, float(scenario.sensor.measures == "position_and_velocity")),
@@ -278,7 +278,7 @@ def _forces(scenario: Scenario) -> Forces:
 
 
 def _scalars(scenario: Scenario) -> Scalars:
-    start, believed, reward = scenario.start, scenario.belief, scenario.reward
+    start, believed, reward = scenario.start, scenario.filter_model, scenario.reward
     chain = scenario.dropout.chain(scenario.dt_s, scenario.orbit)
     layout = observation_layout(scenario)
     return Scalars(
@@ -287,19 +287,19 @@ def _scalars(scenario: Scenario) -> Scalars:
         max_accel=scenario.spacecraft.max_accel_m_s2,
         min_accel=scenario.spacecraft.min_accel_m_s2,
         thrust_noise=scenario.spacecraft.thrust_noise,
-        believed_thrust_variance=believed.thrust_noise**2,
+        filter_thrust_variance=believed.thrust_noise**2,
         process_noise=scenario.process_noise_m_s2,
         sigma_pos=scenario.sensor.sigma_pos_m,
         sigma_vel=scenario.sensor.sigma_vel_m_s,
-        spread_pos=start.spread_pos_m,
-        spread_vel=start.spread_vel_m_s,
+        spread_pos=start.initial_sigma_pos_m,
+        spread_vel=start.initial_sigma_vel_m_s,
         initial_variance_pos=believed.initial_sigma_pos_m**2,
         initial_variance_vel=believed.initial_sigma_vel_m_s**2,
         link_loss=chain.stationary_loss,
         link_fail=chain.fail,
         link_recover=chain.recover,
-        linear_cost=1.0 if reward.shape == "linear" else 0.0,
-        quadratic_cost=1 / reward.quadratic_scale_m if reward.shape == "quadratic" else 0.0,
+        linear_cost=1.0 if reward.error_cost == "linear" else 0.0,
+        quadratic_cost=1 / reward.quadratic_scale_m if reward.error_cost == "quadratic" else 0.0,
         max_distance=scenario.limits.max_distance_m,
         keep_out=scenario.limits.keep_out_m,
         tolerance=scenario.tolerance_m,

@@ -27,29 +27,29 @@ class Program(NamedTuple):
 
 
 @cache
-def program(truth_kind: int, belief_kind: int, varied: bool) -> Program:
+def program(truth_kind: int, filter_kind: int, varied: bool) -> Program:
     """The compiled step and reset for kinds of true motion and of the filter's model (see `packing`).
 
     Args:
         truth_kind: of the true motion.
-        belief_kind: of the filter's model.
+        filter_kind: of the filter's model.
         varied: whether rows fly different variants (see `variants`).
     """
-    return _compile(_source_hash(), truth_kind, belief_kind, varied)
+    return _compile(_source_hash(), truth_kind, filter_kind, varied)
 
 
-def _compile(source_hash: int, truth_kind: int, belief_kind: int, varied: bool) -> Program:
+def _compile(source_hash: int, truth_kind: int, filter_kind: int, varied: bool) -> Program:
     """Compile step and reset.
 
     numba's cache looks only at the file of the outermost function; the hash, which is part of the cache's key, makes it
     see the others too. So is what else step and reset take from here: numbers, since functions are new in each process.
     """
-    behind_belief = field.TABLE + (packing.BELIEF_SIZE * LANES if belief_kind == packing.VARYING_MODEL else 0)
-    constant_truth, constant_belief = truth_kind == packing.CONSTANT_MODEL, belief_kind == packing.CONSTANT_MODEL
+    behind_filter_model = field.TABLE + (packing.FILTER_SIZE * LANES if filter_kind == packing.TIME_VARYING else 0)
+    constant_truth, constant_filter = truth_kind == packing.TIME_INVARIANT, filter_kind == packing.TIME_INVARIANT
     # Rows of different variants have models of their own, as rows at different steps have where models vary.
-    one_truth, one_belief = constant_truth and not varied, constant_belief and not varied
-    true_table = variants.TRUTH if constant_truth else behind_belief
-    belief_table = variants.BELIEF if constant_belief else field.TABLE
+    one_truth, one_filter_model = constant_truth and not varied, constant_filter and not varied
+    true_table = variants.TRUTH if constant_truth else behind_filter_model
+    filter_table = variants.FILTER if constant_filter else field.TABLE
     nonlinear = truth_kind in (packing.NONLINEAR_NEAR, packing.NONLINEAR_FAR)
     compiled = numba.njit(cache=True, fastmath=FAST_MATH, error_model="numpy")
 
@@ -77,9 +77,9 @@ def _compile(source_hash: int, truth_kind: int, belief_kind: int, varied: bool) 
             width: as long as the rows used of each tile.
         """
         if varied:
-            true_model, model, process, sensor, forces, settings = variants.nothing_shared()
+            true_dynamics, model, process, sensor, forces, settings = variants.nothing_shared()
         else:
-            true_model, model, process, sensor, forces, settings = packing.unpack(packed[0])
+            true_dynamics, model, process, sensor, forces, settings = packing.unpack(packed[0])
         known_step = -1
         for index in range(len(states)):
             used = min(len(width), len(actions) - index * LANES)
@@ -92,17 +92,17 @@ def _compile(source_hash: int, truth_kind: int, belief_kind: int, varied: bool) 
             noise.draw(tile, width, 0)
             thruster.thrust(tile, width, settings)
             if one_truth:
-                true_motion.fly_linear(tile, width, true_model, settings)
+                true_motion.fly_linear(tile, width, true_dynamics, settings)
             elif nonlinear:
                 true_motion.fly_nonlinear(
                     tile, width, true_table, truth_kind == packing.NONLINEAR_FAR, forces, settings
                 )
             else:
                 true_motion.fly_varying(tile, width, true_table, settings)
-            if one_belief:
+            if one_filter_model:
                 kalman_filter.predict(tile, width, model, process, settings)
             else:
-                kalman_filter.predict_varying(tile, width, belief_table, settings)
+                kalman_filter.predict_varying(tile, width, filter_table, settings)
             kalman_filter.measure(tile, width, sensor, settings)
             reward.judge(tile, width, settings)
             observe.observe(tile, width, settings)

@@ -41,7 +41,7 @@ class Simulation:
         self._states = np.zeros((tiles, field.STATE_FIELDS * LANES))
         self._scratch = np.zeros((field.TILE_FIELDS + self.schedule.shape[2] - WIDTH) * LANES)
         varied = len(self.variants) > 1
-        self._program = (packing.truth_kind(scenario), packing.belief_kind(scenario), varied)
+        self._program = (packing.truth_kind(scenario), packing.filter_kind(scenario), varied)
         self._width = (False,) * (1 if num_rows == 1 else LANES)
         self._nominal_starts = np.array([flown.start.formation.state(flown.orbit) for flown in self.variants])
 

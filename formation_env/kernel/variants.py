@@ -20,7 +20,7 @@ from formation_env.task.schedule import WIDTH
 
 TRUTH: Final = field.SETTINGS
 """Where the tile has the rows' true models, if they do not vary from step to step."""
-BELIEF: Final = field.SETTINGS + packing.BELIEF * LANES
+FILTER: Final = field.SETTINGS + packing.FILTER * LANES
 """The same for the filter's model and process noise."""
 _COUNTER: Final = np.uint64(6)  # behind the blocks of a step and of a reset, in what would be the numbers of step 0
 

@@ -38,7 +38,7 @@ class KalmanFilter:
 
 
 @dataclass(frozen=True)
-class Belief:
+class FilterModel:
     """`KalmanFilter` with the truth's value wherever it leaves one out."""
 
     dynamics: str

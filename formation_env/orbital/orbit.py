@@ -15,7 +15,7 @@ from formation_env.settings import Flag, Positive, Real, settings
 LEAST_ALTITUDE_M = 100e3
 
 
-@settings
+@settings(renamed={"reference": "mean_motion_from"})
 class Orbit:
     """Low Earth orbit of the leader (Ma 2009, Table 5.1): its osculating elements at t = 0.
 
@@ -31,7 +31,7 @@ class Orbit:
         arg_perigee_deg: argument of perigee, deg.
         true_anomaly_deg: true anomaly at t = 0, deg.
         j2: whether the Earth's oblateness acts.
-        reference: radius that the mean motion is taken of; `mean` needs a circular orbit.
+        mean_motion_from: radius that the mean motion is taken of; `mean` needs a circular orbit.
     """
 
     altitude_m: Annotated[Positive, Field(ge=LEAST_ALTITUDE_M, le=50e6)] = 600e3
@@ -41,15 +41,15 @@ class Orbit:
     arg_perigee_deg: Real = 0.0
     true_anomaly_deg: Real = 0.0
     j2: Flag = True
-    reference: Literal["osculating", "mean"] = "osculating"
+    mean_motion_from: Literal["osculating", "mean"] = "osculating"
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         perigee_m = self.semi_major_axis_m * (1 - self.eccentricity) - R_EARTH
         if perigee_m < LEAST_ALTITUDE_M:
             raise ValueError(f"eccentricity: the perigee must be above {LEAST_ALTITUDE_M:g} m, got {perigee_m:.6g} m")
-        if self.reference == "mean" and self.eccentricity > 0:
-            raise ValueError(f"reference: mean needs eccentricity 0, got {self.eccentricity:g}")
+        if self.mean_motion_from == "mean" and self.eccentricity > 0:
+            raise ValueError(f"mean_motion_from: mean needs eccentricity 0, got {self.eccentricity:g}")
         return self
 
     @property
@@ -60,7 +60,7 @@ class Orbit:
     @property
     def radius_m(self) -> float:
         """Radius (for an ellipse: semi-major axis) of the orbit that linear models are linearised about, m."""
-        if self.reference == "osculating" or not self.j2:
+        if self.mean_motion_from == "osculating" or not self.j2:
             return self.semi_major_axis_m
         latitude = math.radians(self.arg_perigee_deg + self.true_anomaly_deg)
         return float(mean_radius_m(self.semi_major_axis_m, self.inclination_rad, latitude))

@@ -52,9 +52,15 @@ _COMPRESSED = "sign(e) log(1 + |e| / (1 m, 1 mm/s)) / log(1 + 1e4)"
 
 BLOCKS: Final = (
     Block("error", 6, "estimated state minus reference state", "m, m/s", _LINEAR),
-    Block("arrival_error", 6, "error at arrival if the follower only coasts; in hold the error now", "m, m/s", _LINEAR),
+    Block(
+        "zero_effort_miss",
+        6,
+        "error at the arrival if the follower coasts until then; in hold the error now",
+        "m, m/s",
+        _LINEAR,
+    ),
     Block("error_log", 6, "error, compressed", "m, m/s", _COMPRESSED),
-    Block("arrival_error_log", 6, "arrival_error, compressed", "m, m/s", _COMPRESSED),
+    Block("zero_effort_miss_log", 6, "zero_effort_miss, compressed", "m, m/s", _COMPRESSED),
     Block("reference", 6, "reference state", "m, m/s", _LINEAR),
     Block("time_to_arrival", 1, "time to the end of the transfer; 0 in hold", "s", "/ period"),
     Block("in_hold", 1, "1 in hold, 0 in transfer", "", ""),
@@ -107,7 +113,7 @@ class ObservationLayout:
         return np.repeat([self.length_m, self.length_m * self.mean_motion_rad_s], 3)
 
     def state(self, observation: NDArray[np.floating], name: str) -> Array:
-        """A block of six, `error`, `arrival_error` or `reference`, in m and m/s.
+        """A block of six, `error`, `zero_effort_miss` or `reference`, in m and m/s.
 
         Args:
             observation: (..., SIZE).

@@ -40,7 +40,7 @@ class DomainRandomization:
         sensor_noise_factor: of the sensor's sigmas.
         process_noise_factor: of process_noise_m_s2.
         outage_length_factor: of dropout.mean_outage_s.
-        outage_spacing_factor: of dropout.mean_between_periods.
+        outage_spacing_factor: of dropout.mean_uptime_orbits.
         loss_probability_factor: of dropout.loss_probability.
         max_accel_factor: of the follower's thrust limit.
         ballistic_coefficient_factor: of the follower's m / (C_d S), by its drag coefficient; the leader's stays.

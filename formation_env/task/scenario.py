@@ -14,29 +14,29 @@ from formation_env.dynamics.nonlinear import World
 from formation_env.dynamics.perturbations import Perturbations
 from formation_env.dynamics.spacecraft import Spacecraft
 from formation_env.formations import AnyFormation, AtLeader
-from formation_env.navigation.filter_settings import Belief, KalmanFilter
+from formation_env.navigation.filter_settings import FilterModel, KalmanFilter
 from formation_env.navigation.sensor import Sensor
 from formation_env.orbital.orbit import Orbit
 from formation_env.settings import NonNegative, Positive, Text, nearest, settings
 from formation_env.task.randomization import DomainRandomization
 
 
-@settings
+@settings(renamed={"spread_pos_m": "initial_sigma_pos_m", "spread_vel_m_s": "initial_sigma_vel_m_s"})
 class Start:
     """Where an episode starts.
 
     Attributes:
         formation: the nominal start is this formation's state.
-        spread_pos_m: 1-sigma of the true position about it, each axis, m.
-        spread_vel_m_s: 1-sigma of the true velocity about it, each axis, m/s.
+        initial_sigma_pos_m: 1-sigma of the true position about it, each axis, m.
+        initial_sigma_vel_m_s: 1-sigma of the true velocity about it, each axis, m/s.
     """
 
     formation: AnyFormation = AtLeader()
-    spread_pos_m: NonNegative = 10.0
-    spread_vel_m_s: NonNegative = 0.01
+    initial_sigma_pos_m: NonNegative = 10.0
+    initial_sigma_vel_m_s: NonNegative = 0.01
 
 
-@settings
+@settings(renamed={"transfer_periods": "transfer_orbits", "hold_periods": "hold_orbits"})
 class Phase:
     """One leg of the mission: get to a formation, then hold it.
 
@@ -44,29 +44,29 @@ class Phase:
 
     Attributes:
         formation: the target; the follower should be at its state at the arrival.
-        transfer_periods: time to get there, in orbital periods; 0 is to be there at once.
-        hold_periods: time to stay, in orbital periods.
+        transfer_orbits: time to get there, in orbital periods; 0 is to be there at once.
+        hold_orbits: time to stay, in orbital periods.
     """
 
     formation: AnyFormation
-    transfer_periods: NonNegative = 0.0
-    hold_periods: Positive
+    transfer_orbits: NonNegative = 0.0
+    hold_orbits: Positive
 
 
-@settings
+@settings(renamed={"shape": "error_cost"})
 class Reward:
     """r = -(delta-v + error_weight |e| dt / T_hold), an equivalent delta-v in m/s.
 
     Attributes:
         error_weight: price of the mean position error of the hold, (m/s) per m.
         transfer_error_weight: price of errors during transfer, also times dt / T_hold; 0 leaves the way free.
-        shape: `linear` in the error, or `quadratic`: |e|^2 / quadratic_scale_m in place of |e|.
+        error_cost: `linear` in the error, or `quadratic`: |e|^2 / quadratic_scale_m in place of |e|.
         quadratic_scale_m: error at which both shapes cost the same, m.
     """
 
     error_weight: NonNegative = 0.01
     transfer_error_weight: NonNegative = 0.0
-    shape: Literal["linear", "quadratic"] = "linear"
+    error_cost: Literal["linear", "quadratic"] = "linear"
     quadratic_scale_m: Positive = 100.0
 
 
@@ -167,12 +167,12 @@ class Scenario:
         """Refuse too many steps, and phases shorter than a step."""
         if not self.phases:
             raise ValueError("phases: must have at least one phase, got []")
-        periods = sum(phase.transfer_periods + phase.hold_periods for phase in self.phases)
+        periods = sum(phase.transfer_orbits + phase.hold_orbits for phase in self.phases)
         steps = periods * self.orbit.period_s / self.dt_s
-        if steps > MAX_STEPS:
-            raise ValueError(f"dt_s: {steps:.7g} steps of {self.dt_s:g} s; an episode has at most {MAX_STEPS}")
+        if steps > MAX_EPISODE_STEPS:
+            raise ValueError(f"dt_s: {steps:.7g} steps of {self.dt_s:g} s; an episode has at most {MAX_EPISODE_STEPS}")
         for index, phase in enumerate(self.phases):
-            for key in ("transfer_periods", "hold_periods"):
+            for key in ("transfer_orbits", "hold_orbits"):
                 periods = getattr(phase, key)
                 if periods > 0 and self.steps(periods) == 0:
                     seconds = periods * self.orbit.period_s
@@ -192,8 +192,8 @@ class Scenario:
             )
         start_s = 0.0
         for index, phase in enumerate(self.phases):
-            arrival_s = start_s + self.steps(phase.transfer_periods) * self.dt_s
-            end_s = arrival_s + self.steps(phase.hold_periods) * self.dt_s
+            arrival_s = start_s + self.steps(phase.transfer_orbits) * self.dt_s
+            end_s = arrival_s + self.steps(phase.hold_orbits) * self.dt_s
             distance_m = math.dist(place, phase.formation.reference(start_s, self.orbit, arrival_s)[:3])
             if distance_m > self.limits.max_distance_m:
                 key = f"phases.{index}.formation" if index else "start.formation"
@@ -210,12 +210,12 @@ class Scenario:
     @property
     def num_steps(self) -> int:
         """Steps of a whole episode."""
-        return sum(self.steps(p.transfer_periods) + self.steps(p.hold_periods) for p in self.phases)
+        return sum(self.steps(p.transfer_orbits) + self.steps(p.hold_orbits) for p in self.phases)
 
     @property
     def hold_s(self) -> float:
         """Total hold time of an episode, s."""
-        return self.dt_s * sum(self.steps(p.hold_periods) for p in self.phases)
+        return self.dt_s * sum(self.steps(p.hold_orbits) for p in self.phases)
 
     @property
     def leader(self) -> Spacecraft:
@@ -227,7 +227,7 @@ class Scenario:
         """What the nonlinear truth is made of."""
         return World(self.orbit, self.perturbations)
 
-    def true_model(self) -> DiscreteModel:
+    def true_dynamics(self) -> DiscreteModel:
         """The true linear dynamics over one step (6, 6), or over each of the steps (num_steps, 6, 6) if they vary.
 
         Raises:
@@ -236,41 +236,41 @@ class Scenario:
         return self._model(self.dynamics, self.orbit, self.spacecraft, self.leader)
 
     @property
-    def belief(self) -> Belief:
+    def filter_model(self) -> FilterModel:
         """What the filter believes, in full."""
-        truth = Belief(
-            dynamics=self._believable,
+        truth = FilterModel(
+            dynamics=self._default_filter_dynamics,
             sigma_pos_m=self.sensor.sigma_pos_m,
             sigma_vel_m_s=self.sensor.sigma_vel_m_s,
             process_noise_m_s2=self.process_noise_m_s2,
             thrust_noise=self.spacecraft.thrust_noise,
             orbit=self.orbit,
             spacecraft=self.spacecraft,
-            initial_sigma_pos_m=self.start.spread_pos_m,
-            initial_sigma_vel_m_s=self.start.spread_vel_m_s,
+            initial_sigma_pos_m=self.start.initial_sigma_pos_m,
+            initial_sigma_vel_m_s=self.start.initial_sigma_vel_m_s,
         )
         own = {field.name: getattr(self.filter, field.name) for field in fields(truth)}
         return replace(truth, **{name: value for name, value in own.items() if value is not None})
 
     @property
-    def _believable(self) -> str:
+    def _default_filter_dynamics(self) -> str:
         """The linear model nearest to the truth."""
         if self.dynamics != NONLINEAR:
             return self.dynamics
         return "yamanaka_ankersen" if self.orbit.eccentricity > 0 else "modified_hcw"
 
-    def filter_model(self) -> DiscreteModel:
+    def filter_dynamics(self) -> DiscreteModel:
         """The dynamics that the filter believes: over one step (6, 6), or over each (num_steps, 6, 6) if they vary."""
-        belief = self.belief
-        leader = self.leader_spacecraft or belief.spacecraft
-        return self._model(belief.dynamics, belief.orbit, belief.spacecraft, leader)
+        filter_model = self.filter_model
+        leader = self.leader_spacecraft or filter_model.spacecraft
+        return self._model(filter_model.dynamics, filter_model.orbit, filter_model.spacecraft, leader)
 
     def _model(self, name: str, orbit: Orbit, spacecraft: Spacecraft, leader: Spacecraft) -> DiscreteModel:
         steps = 0 if get_dynamics(name).time_invariant else self.num_steps
         return _discrete_model(name, self.dt_s, steps, orbit, spacecraft, leader)
 
 
-MAX_STEPS = 1_000_000
+MAX_EPISODE_STEPS = 1_000_000
 
 
 @lru_cache(maxsize=64)

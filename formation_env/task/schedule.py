@@ -21,8 +21,8 @@ FIELDS: Final = {
     "phase": 1,  # index
     "time_left": 1,  # to the end of the phase, in periods
     "link_closed": 1,  # 1 while a dropout window is open
-    "error_price": 1,  # price of an error over the step to this instant, (m/s) per m
-    "price_left": 1,  # sum of the later prices
+    "error_weight": 1,  # price of an error over the step to this instant, (m/s) per m
+    "weight_left": 1,  # sum of the later prices
     "counts": 1,  # 1 if the step to this instant belongs to a hold
     "counts_left": 1,  # later steps that do
     "arrives": 1,  # 1 / number of transfers if one ends at this instant; without any, the start counts
@@ -54,8 +54,8 @@ def legs(scenario: Scenario) -> list[Leg]:
     """The phases of a scenario on the clock."""
     result, start = [], 0
     for index, phase in enumerate(scenario.phases):
-        arrival = start + scenario.steps(phase.transfer_periods)
-        end = arrival + scenario.steps(phase.hold_periods)
+        arrival = start + scenario.steps(phase.transfer_orbits)
+        end = arrival + scenario.steps(phase.hold_orbits)
         result.append(Leg(index, phase, start, arrival, end))
         start = end
     return result
@@ -77,7 +77,7 @@ def build_schedule(scenario: Scenario) -> Array:
     column(table, "arrives")[arrivals] = 1 / len(arrivals)
     times_s: Array = scenario.dt_s * np.arange(len(table), dtype=float)
     column(table, "link_closed")[:] = scenario.dropout.closed(times_s)
-    for name, left in (("error_price", "price_left"), ("counts", "counts_left"), ("arrives", "arrives_left")):
+    for name, left in (("error_weight", "weight_left"), ("counts", "counts_left"), ("arrives", "arrives_left")):
         added = column(table, name)
         column(table, left)[:] = np.cumsum(added[::-1])[::-1] - added
     return table
@@ -107,7 +107,7 @@ def _fill_plan(table: Array, scenario: Scenario, leg: Leg) -> None:
     in_force = slice(leg.start, leg.end + 1)
     reference = leg_reference(scenario, leg, steps)
     coast_steps = np.maximum(leg.arrival - steps, 0)
-    Phi, delta = _coasts(scenario.filter_model().steps(leg.start, leg.arrival))
+    Phi, delta = _coasts(scenario.filter_dynamics().steps(leg.start, leg.arrival))
     goal = leg_reference(scenario, leg, np.maximum(steps, leg.arrival))
     columns(table, "reference")[in_force] = reference
     columns(table, "coast_in_plane")[in_force] = Phi[np.ix_(coast_steps, IN_PLANE, IN_PLANE)].reshape(-1, 16)
@@ -147,5 +147,5 @@ def _fill_scores(table: Array, scenario: Scenario, leg: Leg) -> None:
     held = ends > leg.arrival
     weight = np.where(held, scenario.reward.error_weight, scenario.reward.transfer_error_weight)
     columns(table, "scored_position")[judged] = leg_reference(scenario, leg, ends)[:, :3]
-    column(table, "error_price")[judged] = np.where(ends > 0, weight, 0) * scenario.dt_s / scenario.hold_s
+    column(table, "error_weight")[judged] = np.where(ends > 0, weight, 0) * scenario.dt_s / scenario.hold_s
     column(table, "counts")[judged] = held

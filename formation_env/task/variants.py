@@ -16,7 +16,7 @@ MAX_VARIANT_STEPS: Final = 500_000
 
 _OF_DROPOUT: Final = {
     "outage_length_factor": "mean_outage_s",
-    "outage_spacing_factor": "mean_between_periods",
+    "outage_spacing_factor": "mean_uptime_orbits",
     "loss_probability_factor": "loss_probability",
 }
 """Quantities of the dropout model, and their names there; no model has them all."""
@@ -76,7 +76,7 @@ def _parts(scenario: Scenario, values: dict[str, float]) -> dict[str, Any]:
         "process_noise_m_s2": scenario.process_noise_m_s2 * factor["process_noise_factor"],
         "sensor": _scaled(scenario.sensor, factor["sensor_noise_factor"], ("sigma_pos_m", "sigma_vel_m_s")),
         "dropout": dropout,
-        "start": _scaled(start, factor["start_spread_factor"], ("spread_pos_m", "spread_vel_m_s")),
+        "start": _scaled(start, factor["start_spread_factor"], ("initial_sigma_pos_m", "initial_sigma_vel_m_s")),
         "phases": tuple(replace(phase, formation=_resized(phase.formation, size)) for phase in scenario.phases),
     }
 

@@ -15,9 +15,9 @@ from formation_env.task.observation import SIZE
 
 SCENARIO = """
 spacecraft: {max_accel_m_s2: 0.002}
-start: {formation: {kind: space_circle, x0_m: 2000, vx0_m_s: 0.2}, spread_pos_m: 50, spread_vel_m_s: 0.05}
+start: {formation: {kind: space_circle, x0_m: 2000, vx0_m_s: 0.2}, initial_sigma_pos_m: 50, initial_sigma_vel_m_s: 0.05}
 phases:
-  - {formation: {kind: space_circle, x0_m: 2000, vx0_m_s: 0.2}, hold_periods: 0.1}
+  - {formation: {kind: space_circle, x0_m: 2000, vx0_m_s: 0.2}, hold_orbits: 0.1}
 """
 SMALL = {
     "ppo": "rows: 8\nrollout_steps: 16\nbatch_size: 64\nepochs: 1\nnetwork: {hidden: [8]}\n",

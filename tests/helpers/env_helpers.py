@@ -24,7 +24,7 @@ MU, R_EARTH = 3.986004391e14, 6378136.6
 def noise_free(name: str, dropout: Dropout = NoDropout()) -> Scenario:  # noqa: B008, settings are frozen
     """A shipped scenario in which nothing is random and the filter starts at the truth."""
     scenario = load_scenario(name)
-    start = dataclasses.replace(scenario.start, spread_pos_m=0.0, spread_vel_m_s=0.0)
+    start = dataclasses.replace(scenario.start, initial_sigma_pos_m=0.0, initial_sigma_vel_m_s=0.0)
     sensor = Sensor(sigma_pos_m=0.0, sigma_vel_m_s=0.0)
     return dataclasses.replace(scenario, start=start, sensor=sensor, process_noise_m_s2=0.0, dropout=dropout)
 
@@ -32,14 +32,14 @@ def noise_free(name: str, dropout: Dropout = NoDropout()) -> Scenario:  # noqa: 
 def restless(max_distance_m: float = 800.0) -> Scenario:
     """A short flight with limits so near that random actions end episodes at many different steps."""
     scenario = load_scenario("keeping")
-    phases = tuple(dataclasses.replace(phase, hold_periods=0.15) for phase in scenario.phases)
-    start = dataclasses.replace(scenario.start, spread_pos_m=200.0, spread_vel_m_s=0.5)
+    phases = tuple(dataclasses.replace(phase, hold_orbits=0.15) for phase in scenario.phases)
+    start = dataclasses.replace(scenario.start, initial_sigma_pos_m=200.0, initial_sigma_vel_m_s=0.5)
     return dataclasses.replace(scenario, phases=phases, start=start, limits=Limits(max_distance_m=max_distance_m))
 
 
 def start_spread(pos_m: float, vel_m_s: float, scenario: Scenario) -> Scenario:
     """The scenario with another spread of its start."""
-    start: Start = dataclasses.replace(scenario.start, spread_pos_m=pos_m, spread_vel_m_s=vel_m_s)
+    start: Start = dataclasses.replace(scenario.start, initial_sigma_pos_m=pos_m, initial_sigma_vel_m_s=vel_m_s)
     return dataclasses.replace(scenario, start=start)
 
 
@@ -104,7 +104,7 @@ def mean_motion(scenario: Scenario) -> float:
     orbit = scenario.orbit
     a = R_EARTH + orbit.altitude_m
     radius = a
-    if orbit.reference == "mean":
+    if orbit.mean_motion_from == "mean":
         q, i = oracles.J2 * R_EARTH**2 / a, np.radians(orbit.inclination_deg)
         u = np.radians(orbit.arg_perigee_deg + orbit.true_anomaly_deg)
         radius = a - 1.5 * q * np.sin(i) ** 2 * np.cos(2 * u) + 0.75 * q * (1 - 3 * np.cos(i) ** 2)
@@ -144,8 +144,8 @@ def plan(scenario: Scenario) -> list[Instant]:
     instants: list[Instant] = []
     end = 0
     for index, phase in enumerate(scenario.phases):
-        start, arrival = end, end + steps_of(phase.transfer_periods, scenario)
-        end = arrival + steps_of(phase.hold_periods, scenario)
+        start, arrival = end, end + steps_of(phase.transfer_orbits, scenario)
+        end = arrival + steps_of(phase.hold_orbits, scenario)
         target = np.asarray(phase.formation.state(scenario.orbit))
         first = coast(target, (start - arrival) * scenario.dt_s, scenario)
         states = path(first, end - start, scenario)

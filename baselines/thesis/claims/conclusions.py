@@ -114,7 +114,7 @@ def least_fuel_m_s(scenario: Scenario, start: Array, end: Array) -> float:
         start: state (6,), m and m/s.
         end: state (6,).
     """
-    model, steps, n = scenario.filter_model(), scenario.num_steps, scenario.orbit.mean_motion_rad_s
+    model, steps, n = scenario.filter_dynamics(), scenario.num_steps, scenario.orbit.mean_motion_rad_s
     # the error from the free motion that ends where it should: it has to vanish
     error = start - np.linalg.solve(np.linalg.matrix_power(model.Phi, steps), end)
     R = np.tile(np.eye(3) / n**4, (steps, 1, 1))
@@ -130,7 +130,7 @@ def _fidelity() -> Claim:
     scenario = scenarios.keeping(1.0, 60.0)
     state = scenario.start.formation.state(scenario.orbit)
     printed, meant = (
-        replace(scenario, dynamics=name).filter_model().Phi for name in (plan.DYNAMICS, scenario.dynamics)
+        replace(scenario, dynamics=name).filter_dynamics().Phi for name in (plan.DYNAMICS, scenario.dynamics)
     )
     first, second, worst = state, state, 0.0
     for _ in range(int(DAY_S / scenario.dt_s)):

@@ -28,14 +28,14 @@ class Noise:
     Attributes:
         sigma_pos_m: 1-sigma of each measured position axis, m; velocities are measured a hundredth as well per second.
         process_m_s2: 1-sigma of the random acceleration of each axis, m/s^2.
-        spread_pos_m: 1-sigma of the unknown start's position, each axis, m.
-        spread_vel_m_s: 1-sigma of the unknown start's velocity, each axis, m/s.
+        initial_sigma_pos_m: 1-sigma of the unknown start's position, each axis, m.
+        initial_sigma_vel_m_s: 1-sigma of the unknown start's velocity, each axis, m/s.
     """
 
     sigma_pos_m: float = 2.0
     process_m_s2: float = 5e-6
-    spread_pos_m: float = 50.0
-    spread_vel_m_s: float = 0.05
+    initial_sigma_pos_m: float = 50.0
+    initial_sigma_vel_m_s: float = 0.05
 
     @property
     def sigma_vel_m_s(self) -> float:
@@ -48,7 +48,11 @@ class Noise:
             scenario,
             sensor=replace(scenario.sensor, sigma_pos_m=self.sigma_pos_m, sigma_vel_m_s=self.sigma_vel_m_s),
             process_noise_m_s2=self.process_m_s2,
-            start=replace(scenario.start, spread_pos_m=self.spread_pos_m, spread_vel_m_s=self.spread_vel_m_s),
+            start=replace(
+                scenario.start,
+                initial_sigma_pos_m=self.initial_sigma_pos_m,
+                initial_sigma_vel_m_s=self.initial_sigma_vel_m_s,
+            ),
         )
 
     @property
@@ -56,8 +60,8 @@ class Noise:
         """The noise in a sentence."""
         return (
             f"sensor {self.sigma_pos_m:g} m and {self.sigma_vel_m_s:g} m/s, process noise {self.process_m_s2:g} "
-            f"m/s^2, start unknown by {self.spread_pos_m:g} m and {self.spread_vel_m_s:g} m/s (the thesis gives "
-            "none of these)"
+            f"m/s^2, start unknown by {self.initial_sigma_pos_m:g} m and {self.initial_sigma_vel_m_s:g} m/s "
+            "(the thesis gives none of these)"
         )
 
 

@@ -23,7 +23,7 @@ LEVELS: Final = tuple(
 )
 
 
-KNOWN: Final = Noise(spread_pos_m=10.0, spread_vel_m_s=0.02)
+KNOWN: Final = Noise(initial_sigma_pos_m=10.0, initial_sigma_vel_m_s=0.02)
 """Flown for as long as the headline, since the sliding mode takes hours to undo a drift."""
 
 

@@ -51,7 +51,7 @@ class Integrated(Law):
     def make(self, scenario: Scenario) -> AccelerationPolicy:
         """The policy for a scenario."""
         gains = super().make(scenario).gains  # type: ignore[attr-defined]
-        return make_policy("lqr_tracking", scenario, replace(gains, feedforward="integrated"))
+        return make_policy("lqr_quasi_static", scenario, replace(gains, feedforward="integrated"))
 
 
 LQR, TRACKING, SMC = plan.LQR, plan.TRACKING, plan.SMC

@@ -17,7 +17,7 @@ LQR, FINER, SMC = (plan.KEEPING.index(law) for law in (plan.LQR, plan.FINER, pla
 FAILED_LQR, FAILED_SMC = (plan.FAILURE.index(law) for law in (plan.LQR, plan.SMC))
 MEANT_LQR, MEANT_TRACKING = (plan.MEANT.index(law) for law in (plan.LQR, plan.TRACKING))
 WEIGHTS = [plan.KEEPING.index(law) for law in plan.WEIGHTS]
-BLUE, RED, SKY = (style.COLORS[name] for name in ("lqr", "smc", "lqr_tracking"))
+BLUE, RED, SKY = (style.COLORS[name] for name in ("lqr", "smc", "lqr_quasi_static"))
 
 
 def initialization(flown: Flown, periods: str) -> Figure:

@@ -14,7 +14,7 @@ WIDTH_IN: Final = 8.0
 DPI: Final = 150
 AXES: Final = (("x", "#009E73", "-"), ("y", "#E69F00", "--"), ("z", "#333333", "-."))
 """Name, colour and dash of each LVLH axis; Okabe and Ito's colours."""
-COLORS: Final = {name: look.color for name, look in looks(("lqr", "lqr_tracking", "smc")).items()}
+COLORS: Final = {name: look.color for name, look in looks(("lqr", "lqr_quasi_static", "smc")).items()}
 """Of the policies, as in the report."""
 DESIRED: Final = NEUTRAL
 PLANNED: Final = "#333333"

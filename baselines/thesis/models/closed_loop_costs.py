@@ -14,7 +14,7 @@ from formation_env.evaluation.statistics import bootstrap_interval
 from formation_env.task.loading import config_folder, load_scenario
 from formation_env.task.scenario import Scenario
 
-LAWS: Final = ("lqr", "smc", "lqr_tracking")
+LAWS: Final = ("lqr", "smc", "lqr_quasi_static")
 LINEAR: Final = "linear"
 OSCULATING: Final = "nonlinear, osculating reference"
 MEAN: Final = "nonlinear, mean reference"
@@ -54,7 +54,7 @@ COMPARISONS: Final = (
 def _circular(name: str) -> dict[str, Scenario]:
     linear = _believing(load_scenario(name), "modified_hcw")
     true = replace(linear, dynamics=NONLINEAR)
-    return {LINEAR: linear, OSCULATING: true, MEAN: replace(true, orbit=replace(true.orbit, reference="mean"))}
+    return {LINEAR: linear, OSCULATING: true, MEAN: replace(true, orbit=replace(true.orbit, mean_motion_from="mean"))}
 
 
 def _elliptic(name: str) -> dict[str, Scenario]:

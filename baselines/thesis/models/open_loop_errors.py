@@ -94,7 +94,7 @@ def strayed(orbit: Orbit, states: Array) -> dict[str, Array]:
     found = {}
     for name, model in MODELS.items():
         if model.reference == "osculating" or orbit.eccentricity == 0:
-            believed = replace(orbit, reference=model.reference)
+            believed = replace(orbit, mean_motion_from=model.reference)
             path = propagate(states, times_s, dynamics=model.dynamics, orbit=believed, spacecraft=_NO_AIR)
             error_m = np.linalg.norm((path - truth)[..., :3], axis=-1)
             found[name] = np.stack([error_m[:, : span * INSTANTS + 1].max(axis=1) for span in SPANS], axis=1)

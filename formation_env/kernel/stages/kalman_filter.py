@@ -18,13 +18,13 @@ def filter_time_update(tile: Array, i: int, model: Model, noise: ProcessNoise, s
     ax, ay, az = tile[field.COMMAND + i], tile[field.COMMAND + LANES + i], tile[field.COMMAND + 2 * LANES + i]
     propagate(tile, i, field.ESTIMATE, model, ax, ay, az)
     P = kalman.time_update_4(_load_10(tile, field.P_IN_PLANE + i), model.Phi_in_plane, noise.Q_in_plane)
-    P = kalman.thrust_noise_update_4(P, model.Gamma_in_plane, ax, ay, settings.believed_thrust_variance)
+    P = kalman.thrust_noise_update_4(P, model.Gamma_in_plane, ax, ay, settings.filter_thrust_variance)
     _store_10(tile, field.P_IN_PLANE + i, P)
     p = field.P_CROSS_TRACK + i
     C = kalman.time_update_2(
         (tile[p], tile[p + LANES], tile[p + 2 * LANES]), model.Phi_cross_track, noise.Q_cross_track
     )
-    C = kalman.thrust_noise_update_2(C, model.Gamma_cross_track, az, settings.believed_thrust_variance)
+    C = kalman.thrust_noise_update_2(C, model.Gamma_cross_track, az, settings.filter_thrust_variance)
     tile[p], tile[p + LANES], tile[p + 2 * LANES] = C
 
 

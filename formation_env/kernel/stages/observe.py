@@ -25,9 +25,9 @@ IN_HOLD: Final = field.plan("in_hold")
 TIME_LEFT: Final = field.plan("time_left")
 
 SEEN_ERROR: Final = field.seen("error")
-SEEN_ARRIVAL: Final = field.seen("arrival_error")
+SEEN_MISS: Final = field.seen("zero_effort_miss")
 SEEN_ERROR_LOG: Final = field.seen("error_log")
-SEEN_ARRIVAL_LOG: Final = field.seen("arrival_error_log")
+SEEN_MISS_LOG: Final = field.seen("zero_effort_miss_log")
 SEEN_REFERENCE: Final = field.seen("reference")
 SEEN_TIME_TO_ARRIVAL: Final = field.seen("time_to_arrival")
 SEEN_IN_HOLD: Final = field.seen("in_hold")
@@ -79,7 +79,7 @@ def observe_error(tile: Array, i: int, axis: int, settings: Scalars) -> None:
 
 
 @inline_scalar
-def observe_arrival(tile: Array, i: int, settings: Scalars) -> None:
+def observe_miss(tile: Array, i: int, settings: Scalars) -> None:
     """The error that coasting leads to."""
     e, m, d = field.ESTIMATE + i, COAST_IN_PLANE + i, COAST_OFFSET + i
     x, y, u, v = tile[e], tile[e + LANES], tile[e + 3 * LANES], tile[e + 4 * LANES]
@@ -94,7 +94,7 @@ def observe_arrival(tile: Array, i: int, settings: Scalars) -> None:
             + tile[k + 3 * LANES] * v
             + tile[d + axis * LANES]
         )
-        _see_error(tile, i, axis, error, SEEN_ARRIVAL, SEEN_ARRIVAL_LOG, settings)
+        _see_error(tile, i, axis, error, SEEN_MISS, SEEN_MISS_LOG, settings)
     for row in range(2):
         axis = 2 + 3 * row
         k = COAST_CROSS_TRACK + 2 * row * LANES + i
@@ -103,8 +103,8 @@ def observe_arrival(tile: Array, i: int, settings: Scalars) -> None:
             i,
             axis,
             tile[k] * z + tile[k + LANES] * w + tile[d + axis * LANES],
-            SEEN_ARRIVAL,
-            SEEN_ARRIVAL_LOG,
+            SEEN_MISS,
+            SEEN_MISS_LOG,
             settings,
         )
 
@@ -132,6 +132,6 @@ def observe(tile: Array, width: Width, settings: packing.Scalars | None) -> None
         for i in range(len(width)):
             observe_error(tile, i, axis, own_scalars(tile, i, settings))
     for i in range(len(width)):
-        observe_arrival(tile, i, own_scalars(tile, i, settings))
+        observe_miss(tile, i, own_scalars(tile, i, settings))
     for i in range(len(width)):
         observe_rest(tile, i, own_scalars(tile, i, settings))

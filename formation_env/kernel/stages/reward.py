@@ -15,10 +15,10 @@ from formation_env.numerics.jit import LANES, inline_scalar, tile_function
 SCORED_POSITION: Final = field.plan("scored_position")
 
 
-ERROR_PRICE: Final = field.plan("error_price")
+ERROR_WEIGHT: Final = field.plan("error_weight")
 
 
-PRICE_LEFT: Final = field.plan("price_left")
+WEIGHT_LEFT: Final = field.plan("weight_left")
 
 
 COUNTS: Final = field.plan("counts")
@@ -50,9 +50,9 @@ def reward_and_end(tile: Array, i: int, settings: Scalars) -> None:
     ends = outside & (tile[field.STEP + i] > 0.0)
     # An early end costs as much as staying at the limit until the end, so that leaving never pays.
     stay = max(error, settings.max_distance)
-    stay_cost = tile[PRICE_LEFT + i] * (settings.linear_cost * stay + settings.quadratic_cost * stay * stay)
+    stay_cost = tile[WEIGHT_LEFT + i] * (settings.linear_cost * stay + settings.quadratic_cost * stay * stay)
     exit_cost = stay_cost if ends else 0.0
-    error_cost = tile[ERROR_PRICE + i] * (settings.linear_cost * error + settings.quadratic_cost * error * error)
+    error_cost = tile[ERROR_WEIGHT + i] * (settings.linear_cost * error + settings.quadratic_cost * error * error)
     tile[field.PHASE + i] = tile[PHASE + i]
     tile[field.POSITION_ERROR + i] = error
     tile[field.ERROR_COST + i] = error_cost

@@ -41,7 +41,7 @@ def test_foresight_is_what_the_filter_predicts(name: str) -> None:
         thrusts = rng.normal(0, 0.01, (8, 3)).astype(np.float32)
         expected = foresight.errors(torch.from_numpy(observations), torch.from_numpy(thrusts)).numpy()
         observations = env.step(thrusts)[0]
-        got = np.hstack([layout.state(observations, block) for block in ("error", "arrival_error")])
+        got = np.hstack([layout.state(observations, block) for block in ("error", "zero_effort_miss")])
         for axes, unit, within in ((POSITIONS, UNIT_POS_M, 0.05), (VELOCITIES, UNIT_VEL_M_S, 5e-5)):
             np.testing.assert_allclose(
                 unit * expected[:, axes], got[:, axes], rtol=1e-5, atol=within, err_msg=f"step {step}"

@@ -16,7 +16,7 @@ def test_shaping_adds_nothing_but_the_potential_of_the_start(bootstrap_end: bool
     """Ng, Harada & Russell (1999): discounted, what is added sums to -Phi(start), whatever is flown.
 
     With the value of the last observation behind the end, gamma^T Phi(last) is left over: it is taken off that value.
-    The oracle is the unshaped environment, and the potential taken from the layout's `arrival_error`.
+    The oracle is the unshaped environment, and the potential taken from the layout's `zero_effort_miss`.
     """
     gamma, weight, rows = 0.9, 0.02, 4
     scenario = small_run(tmp_path, "ppo").scenario
@@ -37,7 +37,7 @@ def test_shaping_adds_nothing_but_the_potential_of_the_start(bootstrap_end: bool
     lasts = np.stack([info["terminal_observation"] for info in other[3]])
     layout = observation_layout(scenario)
     phi, last = (
-        -weight * np.linalg.norm(layout.state(seen, "arrival_error")[:, :3], axis=1) for seen in (starts, lasts)
+        -weight * np.linalg.norm(layout.state(seen, "zero_effort_miss")[:, :3], axis=1) for seen in (starts, lasts)
     )
     assert (phi < -0.1).all()
     left = gamma**scenario.num_steps * last if bootstrap_end else 0.0

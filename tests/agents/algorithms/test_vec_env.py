@@ -21,8 +21,8 @@ ROWS = 5
 
 def short_scenario(**changes: Any) -> Scenario:
     """A hold of 19 steps; the rows that drift beyond 150 m end before that."""
-    phases = [{"formation": {"kind": "space_circle", "x0_m": 2000, "vx0_m_s": 0.2}, "hold_periods": 0.1}]
-    start = {"formation": phases[0]["formation"], "spread_pos_m": 50, "spread_vel_m_s": 0.05}
+    phases = [{"formation": {"kind": "space_circle", "x0_m": 2000, "vx0_m_s": 0.2}, "hold_orbits": 0.1}]
+    start = {"formation": phases[0]["formation"], "initial_sigma_pos_m": 50, "initial_sigma_vel_m_s": 0.05}
     data = {"spacecraft": {"max_accel_m_s2": 0.002}, "start": start, "phases": phases}
     return build(Scenario, data | {"limits": {"max_distance_m": 120}} | changes, "test")
 

@@ -27,11 +27,11 @@ MAGNIFICATION = 50.0
 SEEDS = range(3_000_000, 3_000_006)
 
 
-def short(name: str, hold_periods: float = 0.2) -> Scenario:
+def short(name: str, hold_orbits: float = 0.2) -> Scenario:
     """A shipped scenario with short phases and a coarse step; random accelerations and outages as they are."""
     scenario = load_scenario(name)
     phases = tuple(
-        dataclasses.replace(phase, transfer_periods=min(phase.transfer_periods, 0.3), hold_periods=hold_periods)
+        dataclasses.replace(phase, transfer_orbits=min(phase.transfer_orbits, 0.3), hold_orbits=hold_orbits)
         for phase in scenario.phases
     )
     return dataclasses.replace(scenario, phases=phases, dt_s=60.0)
@@ -61,7 +61,7 @@ def flown_costs(net: nn.Sequential, functions: Functions, scenario: Scenario) ->
 CASES = [
     ("keeping", Reward()),
     ("initialization", Reward(transfer_error_weight=0.002)),
-    ("mission", Reward(shape="quadratic")),
+    ("mission", Reward(error_cost="quadratic")),
 ]
 
 
@@ -111,7 +111,7 @@ def test_features_magnify_errors_and_leave_the_observation_alone() -> None:
     before = observation.copy()
     shown = features(observation, 10.0)
     np.testing.assert_array_equal(observation, before)
-    for block in ("error", "arrival_error"):
+    for block in ("error", "zero_effort_miss"):
         np.testing.assert_allclose(shown[:, SLICES[block]], np.clip(10 * before[:, SLICES[block]], -CUT, CUT))
     rest = slice(SLICES["error_log"].start, SIZE)
     np.testing.assert_array_equal(shown[:, rest], before[:, rest])
@@ -140,7 +140,7 @@ def test_the_models_features_are_the_environments() -> None:
 
 def test_a_clone_flies_nearly_as_its_teacher() -> None:
     """Untaught, the network costs many times what LQR costs; taught, a little more than it."""
-    scenario = short("keeping", hold_periods=0.5)
+    scenario = short("keeping", hold_orbits=0.5)
     functions, net = Functions("tanh", "tanh", 2.0, MAGNIFICATION), network(size=0.1, width=64)
     teacher = make_policy("lqr", scenario)
     before = flown_costs(net, functions, scenario).mean()

@@ -23,7 +23,7 @@ COSTS = {
     "ppo": LEVEL - 0.05 + RNG.normal(0, 0.02, SEEDS),
     "lqr": LEVEL,
     "smc": LEVEL + 0.3,
-    "lqr_planned": LEVEL - 0.01,
+    "lqr_nominal": LEVEL - 0.01,
     "mpc": (LEVEL - 0.1)[:4],
 }
 

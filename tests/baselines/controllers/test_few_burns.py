@@ -33,7 +33,7 @@ class Counting:
         return actions, state
 
 
-def quiet(name: str, max_accel_m_s2: float, spread_pos_m: float = 0.0) -> Scenario:
+def quiet(name: str, max_accel_m_s2: float, initial_sigma_pos_m: float = 0.0) -> Scenario:
     """A shipped scenario in HCW's world, without noise and losses; formations without drift stay by themselves."""
     scenario = load_scenario(name)
     return dataclasses.replace(
@@ -42,7 +42,7 @@ def quiet(name: str, max_accel_m_s2: float, spread_pos_m: float = 0.0) -> Scenar
         process_noise_m_s2=0.0,
         sensor=Sensor(sigma_pos_m=0.0, sigma_vel_m_s=0.0),
         dropout=NoDropout(),
-        start=dataclasses.replace(scenario.start, spread_pos_m=spread_pos_m, spread_vel_m_s=0.0),
+        start=dataclasses.replace(scenario.start, initial_sigma_pos_m=initial_sigma_pos_m, initial_sigma_vel_m_s=0.0),
         spacecraft=dataclasses.replace(scenario.spacecraft, max_accel_m_s2=max_accel_m_s2),
     )
 
@@ -64,7 +64,7 @@ def test_two_impulses_cost_the_closed_form(periods: float) -> None:
     A coast from there on stays within the 30 s that the second burn comes late, at the arrival's speed.
     """
     scenario = quiet("reconfiguration", max_accel_m_s2=1.0)
-    phase = dataclasses.replace(scenario.phases[0], transfer_periods=periods)
+    phase = dataclasses.replace(scenario.phases[0], transfer_orbits=periods)
     scenario = dataclasses.replace(scenario, phases=(phase,))
     gains = {"correction": {"miss_m": 1.0}, "keeping": {"band_m": 1e5}}
     flown = evaluate(make_policy("two_impulse", scenario, gains), scenario, [0])
@@ -88,7 +88,7 @@ def test_corrections_take_the_miss_away() -> None:
     (leg,) = legs(scenario)
     Phi, aim = to_arrival(scenario, leg), aims(scenario, leg)
     np.testing.assert_allclose(Phi[:, :3, 3:] @ aim, np.tile(np.eye(3), (len(aim), 1, 1)), atol=1e-9)
-    expected = np.linalg.matrix_power(scenario.filter_model().Phi, len(Phi))
+    expected = np.linalg.matrix_power(scenario.filter_dynamics().Phi, len(Phi))
     np.testing.assert_allclose(Phi[0], expected, rtol=1e-7, atol=1e-9 * np.abs(expected).max())
 
 
@@ -117,12 +117,12 @@ def test_coasting_sums_are_sums(window: int) -> None:
 
 def test_a_deadband_rests_within_its_band() -> None:
     """HCW's own ellipse stays: from the reference nothing fires; from 20 m off it does, and comes within the band."""
-    gains = {"keeping": {"band_m": 10.0, "look_ahead_periods": 0.5}}
+    gains = {"keeping": {"band_m": 10.0, "look_ahead_orbits": 0.5}}
     still = quiet("keeping", 0.002)
     resting = Counting(make_policy("deadband", still, gains))
     assert evaluate(resting, still, [0])["delta_v_m_s"][0] == 0
     assert resting.fired == 0
-    off = quiet("keeping", 0.002, spread_pos_m=20.0)
+    off = quiet("keeping", 0.002, initial_sigma_pos_m=20.0)
     counting = Counting(make_policy("deadband", off, gains))
     flown = evaluate(counting, off, range(16))
     assert 0 < counting.fired < 0.05 * counting.asked
@@ -144,7 +144,7 @@ def test_few_burns_are_few_and_good_enough(name: str, share: float) -> None:
 def test_lqr_with_a_deadband_fires_less() -> None:
     """Coasting while a thrust saves less than it costs rests in a part of the steps and loses nothing."""
     keeping = load_scenario("keeping")
-    design = {"expected_cost": {"floor": 3.76e-4, "price_scale": 0.937}}
+    design = {"reweighted_lqg": {"floor": 3.76e-4, "error_weight_scale": 0.937}}
     flown = []
     for deadband in (0.0, 1.0):
         counting = Counting(make_policy("lqr", keeping, {**design, "deadband": deadband}))
@@ -163,7 +163,7 @@ def test_a_deadband_needs_a_cost_with_a_unit() -> None:
 def least_energy(scenario: Scenario) -> Array:
     """Least sum of squared thrusts from the start to the arrival, as one least-squares problem (steps, 3), m/s^2."""
     (leg,) = legs(scenario)
-    count, model = leg.arrival - leg.start, scenario.filter_model()
+    count, model = leg.arrival - leg.start, scenario.filter_dynamics()
     to_end = [np.linalg.matrix_power(model.Phi, count - 1 - k) @ model.Gamma for k in range(count)]
     start = scenario.start.formation.state(scenario.orbit)
     gap = leg_reference(scenario, leg, np.array(count)) - np.linalg.matrix_power(model.Phi, count) @ start

@@ -21,7 +21,7 @@ def quiet(scenario: Scenario) -> Scenario:
         process_noise_m_s2=0.0,
         sensor=Sensor(sigma_pos_m=0.0, sigma_vel_m_s=0.0),
         dropout=NoDropout(),
-        start=dataclasses.replace(scenario.start, spread_pos_m=0.0, spread_vel_m_s=0.0),
+        start=dataclasses.replace(scenario.start, initial_sigma_pos_m=0.0, initial_sigma_vel_m_s=0.0),
     )
 
 
@@ -32,7 +32,7 @@ def test_undisturbed_it_costs_what_is_least(name: str) -> None:
     Single-precision observations of kilometres tell the position to a tenth of a millimetre: 1e-3 of the cost.
     """
     scenario = quiet(dataclasses.replace(load_scenario(name), dt_s=60.0))
-    cost = -evaluate(make_policy("lqr_planned", scenario), scenario, [0])["return"][0]
+    cost = -evaluate(make_policy("lqr_nominal", scenario), scenario, [0])["return"][0]
     least = fuel_optimal(scenario).cost
     assert least * (1 - 1e-6) <= cost <= least * (1 + 1e-3)
 
@@ -42,7 +42,7 @@ def test_a_plan_through_all_phases_beats_phases_planned_alone() -> None:
     scenario = dataclasses.replace(load_scenario("mission"), dt_s=60.0)
     planned, alone = (
         -evaluate(make_policy(policy, scenario), scenario, range(12))["return"].to_numpy()
-        for policy in ("lqr_planned", "lqr")
+        for policy in ("lqr_nominal", "lqr")
     )
     assert (planned < 0.9 * alone).all()
 
@@ -50,8 +50,8 @@ def test_a_plan_through_all_phases_beats_phases_planned_alone() -> None:
 def test_the_plan_is_by_what_the_filter_believes() -> None:
     """A nonlinear truth with perturbations: the plan is that of the linear model in its place."""
     real = load_scenario("keeping_nonlinear")
-    belief = real.belief
+    filter_model = real.filter_model
     linear = dataclasses.replace(
-        real, dynamics=belief.dynamics, orbit=belief.orbit, perturbations=type(real.perturbations)()
+        real, dynamics=filter_model.dynamics, orbit=filter_model.orbit, perturbations=type(real.perturbations)()
     )
     np.testing.assert_array_equal(mission_plan(real).states, mission_plan(linear).states)

@@ -18,10 +18,10 @@ from formation_env.task.observation import SIZE, SLICES
 from formation_env.task.scenario import Reward, Scenario
 from formation_env.task.schedule import leg_reference, legs
 
-EVERY_STEP = MPCSettings(horizon_periods=9.0, growth=0.0, error_scatter=0.0, thrust_scatter=0.0)
+EVERY_STEP = MPCSettings(horizon_orbits=9.0, growth=0.0, error_scatter=0.0, thrust_scatter=0.0)
 
 
-def quiet(name: str, dt_s: float = 120.0, spread_pos_m: float = 0.0) -> Scenario:
+def quiet(name: str, dt_s: float = 120.0, initial_sigma_pos_m: float = 0.0) -> Scenario:
     """A shipped scenario at a coarse step, without noise and losses."""
     scenario = load_scenario(name)
     return dataclasses.replace(
@@ -30,7 +30,7 @@ def quiet(name: str, dt_s: float = 120.0, spread_pos_m: float = 0.0) -> Scenario
         process_noise_m_s2=0.0,
         sensor=Sensor(sigma_pos_m=0.0, sigma_vel_m_s=0.0),
         dropout=NoDropout(),
-        start=dataclasses.replace(scenario.start, spread_pos_m=spread_pos_m, spread_vel_m_s=0.0),
+        start=dataclasses.replace(scenario.start, initial_sigma_pos_m=initial_sigma_pos_m, initial_sigma_vel_m_s=0.0),
     )
 
 
@@ -49,7 +49,7 @@ def reach(scenario: Scenario, start: Array) -> tuple[Array, Array, Array]:
 
     And the delta-v price of them, (m/s) per m. Written out from the scenario's model and plan, phase by phase.
     """
-    model, count = scenario.filter_model(), scenario.num_steps
+    model, count = scenario.filter_dynamics(), scenario.num_steps
     state, effect = start, np.zeros((6, 3 * count))
     free, pushed = [], []
     (leg,) = legs(scenario)
@@ -101,7 +101,7 @@ def test_a_plan_costs_what_a_linear_programme_brackets(name: str) -> None:
 @pytest.mark.parametrize("shape", ["linear", "quadratic"])
 def test_a_plans_cost_is_the_environments(shape: str) -> None:
     """Its thrust, put through the model step by step, costs what the solver says, and reaches the limit but no more."""
-    reward = Reward(shape=shape, quadratic_scale_m=50.0)  # type: ignore[arg-type]
+    reward = Reward(error_cost=shape, quadratic_scale_m=50.0)  # type: ignore[arg-type]
     weak = dataclasses.replace(load_scenario("initialization").spacecraft, max_accel_m_s2=0.002)
     scenario = dataclasses.replace(quiet("initialization"), reward=reward, spacecraft=weak)
     start = scenario.start.formation.state(scenario.orbit) + np.array([20.0, -10.0, 15.0, 0.02, 0.0, -0.01])
@@ -160,7 +160,7 @@ def test_a_far_follower_is_thrust_to_the_limit_only() -> None:
 def test_expected_scatter_keeps_it_from_answering_noise() -> None:
     """Half an orbit of keeping: with the scatter in its cost it fires at fewer steps, and spends less."""
     keeping = load_scenario("keeping")
-    phase = dataclasses.replace(keeping.phases[0], hold_periods=0.5)
+    phase = dataclasses.replace(keeping.phases[0], hold_orbits=0.5)
     scenario = dataclasses.replace(keeping, phases=(phase,), dt_s=60.0)
     blind = MPC(scenario, MPCSettings(error_scatter=0.0, thrust_scatter=0.0))
     costs = [
@@ -217,7 +217,7 @@ def test_a_price_on_the_arrival_makes_it_a_constraint() -> None:
     target = leg_reference(scenario, leg, np.array([leg.arrival]))[0, :3]
 
     def miss_m(price: float, scenario: Scenario = scenario) -> float:
-        plan = MPC(scenario, dataclasses.replace(EVERY_STEP, arrival_price=price)).program(0).solve(start)
+        plan = MPC(scenario, dataclasses.replace(EVERY_STEP, arrival_weight=price)).program(0).solve(start)
         assert plan.solved
         return float(np.linalg.norm(plan.states[leg.arrival - 1, :3] - target))
 

@@ -10,7 +10,7 @@ from scipy.optimize import linprog
 from scipy.sparse import eye, kron, vstack
 
 from baselines import make_policy
-from baselines.controllers.lqr_tracking import tracking_gains
+from baselines.controllers.lqr_quasi_static import tracking_gains
 from baselines.controllers.weights import Weights
 from baselines.design.guidance import least_fuel_path
 from baselines.design.phase_tables import nominal_start
@@ -39,7 +39,7 @@ def weights(request: pytest.FixtureRequest) -> Weights:
 def test_discrete_gain_agrees_with_scipy(weights: Weights, dt_s: float) -> None:
     """K = (R + G' P G)^-1 G' P Phi with P of scipy's Riccati solver; 1e-6 allows for the equation's condition."""
     scenario = dataclasses.replace(load_scenario("keeping"), dt_s=dt_s)
-    model, Q, R = scenario.filter_model(), weights.Q(), weights.R(scenario.orbit)
+    model, Q, R = scenario.filter_dynamics(), weights.Q(), weights.R(scenario.orbit)
     P = solve_discrete_are(model.Phi, model.Gamma, Q, R)
     expected = np.linalg.solve(R + model.Gamma.T @ P @ model.Gamma, model.Gamma.T @ P @ model.Phi)
     np.testing.assert_allclose(stationary(model.Phi, model.Gamma, Q, R)[0], expected, rtol=1e-6, atol=1e-12)
@@ -55,7 +55,7 @@ def test_discrete_gain_of_short_steps_is_the_continuous_one(dt_s: float, control
     scenario = dataclasses.replace(load_scenario("thesis_keeping"), dt_s=dt_s)
     weights = Weights(control_s2=(control_s2, control_s2, control_s2))
     A, B = ModifiedHCW().state_matrix(scenario.orbit, scenario.spacecraft), control_matrix()
-    model, Q, R = scenario.filter_model(), weights.Q(), weights.R(scenario.orbit)
+    model, Q, R = scenario.filter_dynamics(), weights.Q(), weights.R(scenario.orbit)
     expected = continuous_gain(A, B, Q, R)[0]
     w = (scenario.orbit.mean_motion_rad_s**2 / control_s2) ** 0.25
     K = stationary(model.Phi, model.Gamma, Q, R)[0]
@@ -92,7 +92,7 @@ def test_quasi_static_feedforward_is_the_limit_of_the_tracking_equation(weights:
 def test_long_finite_horizon_is_the_infinite_one(weights: Weights) -> None:
     """Far from the end the backward Riccati recursion (Ma 2009, eq. 4.12-4.14) has forgotten its terminal weight."""
     scenario = load_scenario("keeping")
-    model, Q, R = scenario.filter_model(), weights.Q(), weights.R(scenario.orbit)
+    model, Q, R = scenario.filter_dynamics(), weights.Q(), weights.R(scenario.orbit)
     gains = finite_horizon_gains(model.Phi, model.Gamma, Q, np.tile(R, (3000, 1, 1)), 10 * Q)
     expected = stationary(model.Phi, model.Gamma, Q, R)[0]
     np.testing.assert_allclose(gains[0], expected, rtol=1e-5, atol=1e-6 * np.abs(expected).max())
@@ -102,7 +102,7 @@ def test_long_finite_horizon_is_the_infinite_one(weights: Weights) -> None:
 def test_finite_horizon_is_the_least_squares_solution() -> None:
     """Least energy to a terminal state is a least-squares problem in all controls at once; solved here as one."""
     scenario = load_scenario("initialization")
-    model, count = scenario.filter_model(), 20
+    model, count = scenario.filter_dynamics(), 20
     # units of 1 m and 1 mm/s keep the stacked problem well conditioned
     unit = np.diag([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])
     start = np.array([10.0, -2000.0, 5.0, 0.1, 0.0, -0.1])
@@ -125,7 +125,7 @@ def least_delta_v(scenario: Scenario, leg: Leg) -> float:
 
     Between two of the directions a burn costs up to 1 % more than it should.
     """
-    model, count = scenario.filter_model(), leg.arrival - leg.start
+    model, count = scenario.filter_dynamics(), leg.arrival - leg.start
     i = np.arange(200) + 0.5
     polar, azimuth = np.arccos(1 - i / 100), np.pi * (1 + 5**0.5) * i
     sphere = np.c_[np.cos(azimuth) * np.sin(polar), np.sin(azimuth) * np.sin(polar), np.cos(polar)]
@@ -151,7 +151,7 @@ def least_delta_v(scenario: Scenario, leg: Leg) -> float:
 def test_least_fuel_path_is_near_the_linear_programme(name: str) -> None:
     """Renewed weights come within 5 % of the least delta-v, and cannot beat it beyond the 1 % of the oracle."""
     scenario = load_scenario(name)
-    leg, model = legs(scenario)[0], scenario.filter_model()
+    leg, model = legs(scenario)[0], scenario.filter_dynamics()
     path = least_fuel_path(scenario, leg)
     jumps = path[1:] - path[:-1] @ model.Phi.T - model.delta
     thrust = jumps @ np.linalg.pinv(model.Gamma).T

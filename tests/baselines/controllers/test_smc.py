@@ -36,7 +36,7 @@ def perfect() -> Scenario:
         sensor=Sensor(sigma_pos_m=0.0, sigma_vel_m_s=0.0),
         dropout=NoDropout(),
         spacecraft=Spacecraft(max_accel_m_s2=1.0),
-        start=Start(formation=keeping.start.formation, spread_pos_m=1.0, spread_vel_m_s=1e-3),
+        start=Start(formation=keeping.start.formation, initial_sigma_pos_m=1.0, initial_sigma_vel_m_s=1e-3),
     )
 
 
@@ -110,7 +110,7 @@ def test_placed_surface_has_the_eigenvalues_asked_for(perfect: Scenario) -> None
     """On the surface, x(k+1) = (I - G (Ce G)^-1 Ce) Phi x: three zeros, and exp(-decay dt) (Ma 2009, eq. 4.48)."""
     decay = (1e-3, 2e-3, 5e-4)
     for scenario in (perfect, dataclasses.replace(perfect, dynamics="modified_hcw", dt_s=30.0)):
-        model = scenario.filter_model()
+        model = scenario.filter_dynamics()
         Ce = PlacedSurface(decay_per_s=decay).Ce(model, scenario.dt_s)
         sliding = model.Phi - model.Gamma @ np.linalg.solve(Ce @ model.Gamma, Ce @ model.Phi)
         expected = np.sort([0, 0, 0, *np.exp(-np.array(decay) * scenario.dt_s)])

@@ -50,7 +50,7 @@ def test_straight_line_hits_its_ends(name: str, index: int) -> None:
 def test_least_fuel_path_arrives(name: str, index: int) -> None:
     """From the nominal start to the target, by accelerations within the limit alone."""
     scenario = load_scenario(name)
-    leg, model = legs(scenario)[index], scenario.filter_model()
+    leg, model = legs(scenario)[index], scenario.filter_dynamics()
     path = least_fuel_path(scenario, leg)
     np.testing.assert_allclose(path[0], nominal_start(scenario, leg), atol=1e-9)
     np.testing.assert_allclose(path[-1], leg.phase.formation.state(scenario.orbit), atol=1e-9)
@@ -70,7 +70,7 @@ def test_tracking_agrees_with_the_truths_clock(guide: Guide) -> None:
     """
     scenario = load_scenario("initialization")
     guidance, env = Guidance(scenario, guide), FormationVectorEnv(2, scenario)
-    model, leg = scenario.filter_model(), legs(scenario)[0]
+    model, leg = scenario.filter_dynamics(), legs(scenario)[0]
     observation, info = env.reset(seed=1)
     band = np.repeat([1e-2, 1e-5], 3)
     promised: Array | None = None
@@ -104,7 +104,7 @@ def test_least_cost_path_settles_on_the_reference() -> None:
     assert np.abs(path[middle, :3] - leg_reference(scenario, leg, np.array(middle))[:3]).max() < 1
 
 
-def from_following(y0_m: float, formation: AnyFormation, transfer_periods: float = 0.5) -> Scenario:
+def from_following(y0_m: float, formation: AnyFormation, transfer_orbits: float = 0.5) -> Scenario:
     """From y0_m ahead of the leader to a formation without noise, by HCW, in steps of 1/600 period."""
     scenario = noise_free("initialization")
     return dataclasses.replace(
@@ -112,7 +112,7 @@ def from_following(y0_m: float, formation: AnyFormation, transfer_periods: float
         dynamics="hcw",
         dt_s=scenario.orbit.period_s / 600,
         start=dataclasses.replace(scenario.start, formation=Following(y0_m=y0_m)),
-        phases=(Phase(formation=formation, transfer_periods=transfer_periods, hold_periods=0.5),),
+        phases=(Phase(formation=formation, transfer_orbits=transfer_orbits, hold_orbits=0.5),),
     )
 
 
@@ -160,9 +160,9 @@ def test_hohmann_path_waits_on_the_reference() -> None:
 
 
 REFUSED: dict[str, tuple[Guide, AnyFormation, float, str]] = {
-    "too short": ("hohmann", Parallel(), 0.4, "hohmann: phases.0.transfer_periods: must be at least 0.5"),
+    "too short": ("hohmann", Parallel(), 0.4, "hohmann: phases.0.transfer_orbits: must be at least 0.5"),
     "another plane": ("hohmann", ProjectedCircle(), 0.5, "hohmann: phases.0.formation: must be in the plane of"),
-    "no leverage": ("two_impulse", SpaceCircle(), 0.5, "phases.0.transfer_periods: time_s: no two impulses"),
+    "no leverage": ("two_impulse", SpaceCircle(), 0.5, "phases.0.transfer_orbits: time_s: no two impulses"),
 }
 
 
@@ -200,8 +200,8 @@ def test_straight_line_of_half_a_period_is_near_hohmanns_ellipse(behind: float) 
 SLOW = {"velocity_s2": [1e4, 1e4, 1e4], "control_s2": [1e2, 1e2, 1e2]}
 CONTROLLERS: dict[str, dict[str, Any]] = {
     "lqr": {"design": "weights"},
-    "lqr_tracking": {"hold": SLOW, "transfer": SLOW},
-    "lqr_tracking integrated": {"hold": SLOW, "transfer": SLOW, "feedforward": "integrated"},
+    "lqr_quasi_static": {"hold": SLOW, "transfer": SLOW},
+    "lqr_quasi_static integrated": {"hold": SLOW, "transfer": SLOW, "feedforward": "integrated"},
     "smc": {},
     "smc relay": {"reaching": {"kind": "relay", "u0_m_s2": 0.004}, "boundary_m": 200.0},
 }

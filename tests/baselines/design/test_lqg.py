@@ -33,7 +33,7 @@ def joint_covariance(scenario: Scenario, K: Array) -> Array:
     e(k+1) = (Phi - G K) e + G K x~ + G w and x~(k+1) = (I - L) (Phi x~ + G w) - L v, with x~ = e - e_hat, L the
     stationary Kalman gain, w and v the noises (Ma 2009, eq. 4.69-4.75).
     """
-    model, sensor, identity = scenario.filter_model(), scenario.sensor, np.eye(6)
+    model, sensor, identity = scenario.filter_dynamics(), scenario.sensor, np.eye(6)
     Phi, G = model.Phi, model.Gamma
     noise = SIGMA_W**2 * G @ G.T
     R_noise = np.diag(np.repeat([sensor.sigma_pos_m, sensor.sigma_vel_m_s], 3) ** 2)

@@ -10,7 +10,7 @@ from scipy.sparse import coo_matrix, csr_matrix, eye, hstack, kron, vstack
 
 from baselines import make_policy
 from baselines.design.phase_tables import nominal_start, start_error
-from baselines.design.reweighted_lqg import Knowledge, expected_cost_gains, knowledge, spread
+from baselines.design.reweighted_lqg import Knowledge, knowledge, reweighted_gains, spread
 from formation_env import FormationVectorEnv, load_scenario
 from formation_env.dropout import NoDropout
 from formation_env.evaluation.rollout import evaluate
@@ -24,7 +24,7 @@ def test_knowledge_settles_at_the_riccati_equation() -> None:
     keeping = dataclasses.replace(load_scenario("keeping"), process_noise_m_s2=1e-4)
     for measures, count in (("position_and_velocity", 6), ("position", 3)):
         scenario = dataclasses.replace(keeping, sensor=Sensor(measures=measures))
-        model, H = scenario.filter_model(), np.eye(count, 6)
+        model, H = scenario.filter_dynamics(), np.eye(count, 6)
         R_noise = np.diag(np.repeat([2.0, 0.02], 3)[:count] ** 2)
         P = solve_discrete_are(model.Phi.T, H.T, 1e-8 * model.Gamma @ model.Gamma.T, R_noise)
         gain = P @ H.T @ np.linalg.inv(H @ P @ H.T + R_noise)
@@ -45,14 +45,14 @@ def test_a_perfect_sensor_leaves_nothing_unknown(dt_s: float) -> None:
         sensor=Sensor(sigma_pos_m=0.0, sigma_vel_m_s=0.0),
         process_noise_m_s2=1e-3,
     )
-    model = scenario.filter_model()
+    model = scenario.filter_dynamics()
     known = knowledge(scenario, model)
     assert np.abs(known.missed).max() < 1e-14
     Q_noise = 1e-6 * model.Gamma @ model.Gamma.T
     np.testing.assert_allclose(
         known.learned[1:], np.tile(Q_noise, (scenario.num_steps, 1, 1)), atol=1e-9 * Q_noise.max()
     )
-    assert np.isfinite(expected_cost_gains(scenario, rounds=0)[0]).all()
+    assert np.isfinite(reweighted_gains(scenario, rounds=0)[0]).all()
 
 
 def test_predicted_scatter_is_what_is_flown() -> None:
@@ -62,9 +62,9 @@ def test_predicted_scatter_is_what_is_flown() -> None:
     """
     scenario = dataclasses.replace(load_scenario("initialization"), dropout=NoDropout())
     scenario = dataclasses.replace(scenario, spacecraft=dataclasses.replace(scenario.spacecraft, max_accel_m_s2=0.05))
-    leg, model, rows = legs(scenario)[0], scenario.filter_model().steps(0, scenario.num_steps), 1000
+    leg, model, rows = legs(scenario)[0], scenario.filter_dynamics().steps(0, scenario.num_steps), 1000
     known = knowledge(scenario, model)
-    gains = expected_cost_gains(scenario)[0]
+    gains = reweighted_gains(scenario)[0]
     predicted = spread(
         model, gains, start_error(scenario, leg), known.learned[0], Knowledge(known.missed, known.learned)
     )
@@ -87,7 +87,7 @@ def certain(name: str) -> Scenario:
         dropout=NoDropout(),
         process_noise_m_s2=0.0,
         sensor=Sensor(sigma_pos_m=0.0, sigma_vel_m_s=0.0),
-        start=Start(formation=scenario.start.formation, spread_pos_m=0.0, spread_vel_m_s=0.0),
+        start=Start(formation=scenario.start.formation, initial_sigma_pos_m=0.0, initial_sigma_vel_m_s=0.0),
     )
 
 
@@ -96,7 +96,7 @@ def least_cost(scenario: Scenario) -> float:
 
     Thrust and error are made of vectors along 206 directions, which costs up to 1 % more than their lengths.
     """
-    leg, model = legs(scenario)[0], scenario.filter_model()
+    leg, model = legs(scenario)[0], scenario.filter_dynamics()
     i = np.arange(200) + 0.5
     polar, azimuth = np.arccos(1 - i / 100), np.pi * (1 + 5**0.5) * i
     sphere = np.c_[np.cos(azimuth) * np.sin(polar), np.sin(azimuth) * np.sin(polar), np.cos(polar)]

@@ -153,9 +153,9 @@ WEIGHTS = {"position": [1.0, 1, 1], "velocity_s2": [1e4, 1e4, 1e4], "control_s2"
 
 
 def flown_cost(scenario: Scenario, feedforward: str, price: Callable[[Array, Array], float]) -> float:
-    """Cost of flying a straight line with `lqr_tracking`."""
+    """Cost of flying a straight line with `lqr_quasi_static`."""
     gains = {"guidance": "straight_line", "feedforward": feedforward, "hold": WEIGHTS, "transfer": WEIGHTS}
-    policy, env = make_policy("lqr_tracking", scenario, gains), FormationEnv(scenario)
+    policy, env = make_policy("lqr_quasi_static", scenario, gains), FormationEnv(scenario)
     observation, info = env.reset(seed=0)
     states, controls = [info["true_state"]], []
     for _ in range(scenario.num_steps):
@@ -178,7 +178,7 @@ def test_tracker_with_integrated_pull_flies_the_optimum() -> None:
     wanted = np.vstack([way, leg_reference(scenario, leg, np.arange(len(way), leg.end + 1))])
     Q_line, R_line = np.diag(np.repeat([1.0, 1e4], 3)), np.eye(3) * 100 / n**2
     P_end = solve_continuous_are(hcw_state_matrix(n), B, Q_line, R_line)
-    model, count = scenario.filter_model(), scenario.num_steps
+    model, count = scenario.filter_dynamics(), scenario.num_steps
 
     def price(states: Array, controls: Array) -> float:
         error = states - wanted

@@ -52,10 +52,10 @@ def test_compiled_filter_settles_at_python_controls_covariance(scenario: Scenari
 @pytest.mark.parametrize("scenario", SETTLING.values(), ids=SETTLING.keys())
 def test_stationary_gain_agrees_with_scipy(scenario: Scenario) -> None:
     """K = P H' (H P H' + R)^-1 with P of scipy's Riccati solver, dual to the regulator's (Ma 2009, eq. 4.71)."""
-    model, belief = scenario.filter_model(), scenario.belief
+    model, filter_model = scenario.filter_dynamics(), scenario.filter_model
     H = np.eye(6)[: 3 if scenario.sensor.measures == "position" else 6]
-    R_noise = np.diag(np.repeat([belief.sigma_pos_m, belief.sigma_vel_m_s], 3)[: len(H)] ** 2)
-    P = solve_discrete_are(model.Phi.T, H.T, belief.process_noise_m_s2**2 * model.Gamma @ model.Gamma.T, R_noise)
+    R_noise = np.diag(np.repeat([filter_model.sigma_pos_m, filter_model.sigma_vel_m_s], 3)[: len(H)] ** 2)
+    P = solve_discrete_are(model.Phi.T, H.T, filter_model.process_noise_m_s2**2 * model.Gamma @ model.Gamma.T, R_noise)
     ours = stationary_filter(scenario)
     sigma = np.sqrt(np.diag(P))
     np.testing.assert_allclose(ours.predicted, P, rtol=0, atol=1e-6 * np.outer(sigma, sigma).max())
@@ -88,7 +88,7 @@ def expected_nis(scenario: Scenario, truth: Array, believed: Array, push: Array)
     sensor, start, identity = scenario.sensor, scenario.start, np.eye(6)
     R_noise = np.diag(np.repeat([sensor.sigma_pos_m, sensor.sigma_vel_m_s], 3) ** 2)
     Q_noise = scenario.process_noise_m_s2**2 * push @ push.T
-    P = np.diag(np.repeat([start.spread_pos_m, start.spread_vel_m_s], 3) ** 2)
+    P = np.diag(np.repeat([start.initial_sigma_pos_m, start.initial_sigma_vel_m_s], 3) ** 2)
     mean = np.tile(start.formation.state(scenario.orbit), 2)
     joint = np.zeros((12, 12))
     joint[:6, :6] = P
@@ -121,8 +121,8 @@ def test_a_wrong_model_shows_in_the_innovations(case: str) -> None:
     The leader's orbit is believed 20 km too high, so n is 0.4 % too low. The band is 5 standard errors of the rows'
     scatter; of 121 values a correct program has one outside with probability 1e-4.
     """
-    belief, altitude_m = WRONG[case]
-    scenario = steady("keeping", dynamics="hcw", filter=belief)
+    filter_model, altitude_m = WRONG[case]
+    scenario = steady("keeping", dynamics="hcw", filter=filter_model)
     motions = [np.sqrt(3.986004391e14 / (6378136.6 + height) ** 3) for height in (600e3, altitude_m)]
     truth, believed = (expm(hcw_state_matrix(n) * scenario.dt_s) for n in motions)
     # the integral of exp(A t) B over the step, by Simpson's rule; 20 km make no difference to it

@@ -29,7 +29,7 @@ from formation_env.settings import build
 
 SHORT = {
     "title": "short",
-    "phases": [{"formation": {"kind": "following", "y0_m": 200}, "transfer_periods": 0.05, "hold_periods": 0.05}],
+    "phases": [{"formation": {"kind": "following", "y0_m": 200}, "transfer_orbits": 0.05, "hold_orbits": 0.05}],
 }
 WANTED = Wanted(4, 2, sweep_episodes=2, sweep_bound_episodes=0, resume=True, slow=("slow",), unswept=("slow",))
 COMMAND = "python -m baselines report --resume"

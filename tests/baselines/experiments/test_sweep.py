@@ -28,7 +28,7 @@ from formation_env.settings import build
 SHORT = {
     "title": "A short flight <with> a transfer & a hold",
     "spacecraft": {"max_accel_m_s2": 0.02},
-    "phases": [{"formation": {"kind": "following", "y0_m": 200}, "transfer_periods": 0.1, "hold_periods": 0.1}],
+    "phases": [{"formation": {"kind": "following", "y0_m": 200}, "transfer_orbits": 0.1, "hold_orbits": 0.1}],
 }
 COMMAND = "python -m baselines sweep short.yaml --episodes 3"
 POLICIES = {name: Classical(name) for name in ("lqr", "smc")}
@@ -36,11 +36,11 @@ WANTED = Wanted(episodes=3, bound_episodes=2)
 TOLD = {FRONT, "sensor_noise", "thrust_limit", "initial_error"}
 CHANGES = {
     FRONT: {"reward.error_weight"},
-    "outage_length": {"dropout.mean_outage_s", "dropout.mean_between_periods"},
-    "measurement_loss": {"dropout.mean_between_periods"},
+    "outage_length": {"dropout.mean_outage_s", "dropout.mean_uptime_orbits"},
+    "measurement_loss": {"dropout.mean_uptime_orbits"},
     "sensor_noise": {"sensor.sigma_pos_m", "sensor.sigma_vel_m_s"},
     "thrust_limit": {"spacecraft.max_accel_m_s2"},
-    "initial_error": {"start.spread_pos_m", "start.spread_vel_m_s"},
+    "initial_error": {"start.initial_sigma_pos_m", "start.initial_sigma_vel_m_s"},
     "true_dynamics": {"dynamics"},
     "ballistic_coefficient": {"spacecraft.area_m2", "leader_spacecraft", "filter.spacecraft"},
     "thrust_magnitude": {"spacecraft.max_accel_m_s2"},
@@ -88,14 +88,18 @@ def test_a_variation_changes_what_it_says_and_nothing_else(quantity: str) -> Non
 
 @pytest.mark.parametrize("name", ["keeping", "bad_communication", "keeping_nonlinear", "mission"])
 def test_the_variations_hold_the_scenarios_own_value(name: str) -> None:
-    """Factors of 1, differences of 0 %: the scenario's physics; a filter may have its belief written out."""
+    """Factors of 1, differences of 0 %: the scenario's physics; a filter may have its filter_model written out."""
     scenario = load_scenario(name)
     for quantity in (FRONT, "sensor_noise", "thrust_limit", "initial_error", "thrust_magnitude"):
         nominal = 0.0 if quantity == "thrust_magnitude" else 1.0
         assert nominal in VARIATIONS[quantity].values
         assert VARIATIONS[quantity].vary(scenario, nominal)[0] == scenario
     flown, _ = VARIATIONS["ballistic_coefficient"].vary(scenario, 0.0)
-    assert (flown.spacecraft, flown.leader, flown.belief) == (scenario.spacecraft, scenario.leader, scenario.belief)
+    assert (flown.spacecraft, flown.leader, flown.filter_model) == (
+        scenario.spacecraft,
+        scenario.leader,
+        scenario.filter_model,
+    )
 
 
 def test_a_quick_look_has_ends_and_middle() -> None:
@@ -139,11 +143,11 @@ def test_a_wrong_ballistic_coefficient_is_hidden_from_the_filter() -> None:
     craft, v = scenario.spacecraft, scenario.orbit.speed_m_s
     inverse = craft.drag_coefficient * craft.area_m2 / craft.mass_kg
     push_m_s2 = -0.5 * craft.air_density_kg_m3 * v**2 * (inverse / 1.5 - inverse)
-    true, believed = flown.true_model(), flown.filter_model()
+    true, believed = flown.true_dynamics(), flown.filter_dynamics()
     # along-track velocity gained in one 30 s step; coupling into it is of the order (n dt)^2 = 1e-3
     assert true.delta[4] == pytest.approx(push_m_s2 * scenario.dt_s, rel=5e-3)
     assert np.abs(believed.delta).max() == 0
-    np.testing.assert_array_equal(believed.Phi, scenario.filter_model().Phi)
+    np.testing.assert_array_equal(believed.Phi, scenario.filter_dynamics().Phi)
 
 
 def test_a_stronger_thruster_thrusts_more_than_commanded() -> None:

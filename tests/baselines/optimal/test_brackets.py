@@ -131,7 +131,7 @@ def test_linear_programs_bracket_the_bound(name: str, limit: float) -> None:
     what its thrust truly costs, and its value, close in on the optimum to 0.1 %. The smaller limit is at work.
     """
     scenario = with_phase(
-        vary(name, dynamics="hcw", dt_s=200.0, max_accel_m_s2=limit, process_noise_m_s2=5e-5), hold_periods=0.3
+        vary(name, dynamics="hcw", dt_s=200.0, max_accel_m_s2=limit, process_noise_m_s2=5e-5), hold_orbits=0.3
     )
     plan, program = fuel_optimal(scenario, seed=5), polyhedral(scenario, 5)
     steps, judged, around = scenario.num_steps, len(program.price), sphere(100)

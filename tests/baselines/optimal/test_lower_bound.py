@@ -27,7 +27,7 @@ START = np.array([30.0, -40.0, 0.0, 0.02, -0.01, 0.0])
 def eccentric() -> Scenario:
     """A closed formation about an eccentric leader, whose linear truth varies from step to step."""
     scenario = dataclasses.replace(load_scenario("keeping_eccentric"), dynamics="yamanaka_ankersen")
-    return with_phase(scenario, hold_periods=0.5)
+    return with_phase(scenario, hold_orbits=0.5)
 
 
 @pytest.mark.parametrize(("periods", "share", "saves"), [(0.5, np.pi, 0), (1.0, 2 / 3, 2e-3), (2.0, 1 / 3, 1e-3)])
@@ -38,7 +38,7 @@ def test_impulses_shift_along_track_as_hill_has_it(periods: float, share: float,
     proves that no other thrust does better. After whole periods two impulses are not quite the best: burns shortly
     after the start and before the end save a per mille.
     """
-    scenario = with_phase(vary("initialization", dynamics="hcw", dt_s=Orbit().period_s / 200), transfer_periods=periods)
+    scenario = with_phase(vary("initialization", dynamics="hcw", dt_s=Orbit().period_s / 200), transfer_orbits=periods)
     plan = impulsive_transfer(scenario)
     expected = share * 2000 / Orbit().period_s
     assert (1 - saves - 1e-6) * expected < plan.delta_v_m_s < (1 - 0.3 * saves + 1e-6) * expected
@@ -57,7 +57,7 @@ def test_a_fine_grid_without_limit_comes_to_the_two_impulses() -> None:
     """
     scenario = vary("initialization", dynamics="hcw", max_accel_m_s2=1.0)
     period_s = scenario.orbit.period_s
-    scenario = with_phase(scenario, transfer_periods=2910 / period_s, hold_periods=300 / period_s)
+    scenario = with_phase(scenario, transfer_orbits=2910 / period_s, hold_orbits=300 / period_s)
     model = HCW().discretise(0.0, 2910.0, scenario.orbit, scenario.spacecraft, scenario.spacecraft)
     goal = np.array([0, 2000.0, 0, 0, 0, 0])
     impulses = two_impulse(model, 2910.0, scenario.orbit.mean_motion_rad_s, START, goal).delta_v_m_s
@@ -114,7 +114,7 @@ def test_exact_arrivals_of_the_mission_are_met() -> None:
         load_scenario("initialization"),
         load_scenario("reconfiguration"),
         load_scenario("keeping"),
-        vary("initialization", shape="quadratic", transfer_error_weight=1e-4),
+        vary("initialization", error_cost="quadratic", transfer_error_weight=1e-4),
         vary("initialization", thrust_noise=0.2),
         eccentric(),
     ],
@@ -149,8 +149,8 @@ def test_the_plan_costs_in_the_environment_what_it_says(scenario: Scenario) -> N
     [
         load_scenario("initialization"),
         load_scenario("reconfiguration"),
-        with_phase(load_scenario("keeping"), hold_periods=0.5),
-        vary("initialization", shape="quadratic"),
+        with_phase(load_scenario("keeping"), hold_orbits=0.5),
+        vary("initialization", error_cost="quadratic"),
         vary("initialization", thrust_noise=0.2, min_accel_m_s2=1e-4),
     ],
     ids=["initialization", "reconfiguration", "keeping", "quadratic", "thruster"],
@@ -182,13 +182,13 @@ def test_any_multipliers_give_a_lower_bound(shape: str) -> None:
 
     Random ones of many sizes, some towards the goal; and those of a dearer problem, which are too long for this one.
     """
-    scenario, rng = vary("initialization", shape=shape), np.random.default_rng(1)
+    scenario, rng = vary("initialization", error_cost=shape), np.random.default_rng(1)
     problem, cost = episode_problem(scenario, 2), fuel_optimal(scenario, seed=2).cost
     for size in np.geomspace(1e-7, 1e-1, 20):
         multipliers = size * rng.normal(size=(scenario.num_steps + 1, 6))
         multipliers += size * np.concatenate([-problem.goal[:, :3], np.zeros_like(multipliers[:, 3:])], axis=1) / 2000
         assert lower_bound(problem, multipliers) <= cost
-    dearer = episode_problem(vary("initialization", shape=shape, error_weight=0.02), 2)
+    dearer = episode_problem(vary("initialization", error_cost=shape, error_weight=0.02), 2)
     assert lower_bound(problem, solve(dearer).multipliers) <= cost < lower_bound(dearer, solve(dearer).multipliers)
 
 
@@ -211,11 +211,11 @@ def test_what_has_no_bound_is_refused() -> None:
         fuel_optimal("keeping", seed=1, initial_state=np.zeros(6))
     with pytest.raises(ValueError, match=r"initial_state: must be finite with shape \(6,\), got shape \(3,\)"):
         fuel_optimal("keeping", initial_state=[1, 2, 3])
-    with pytest.raises(ValueError, match="exact_arrival: the scenario has no phase with transfer_periods > 0"):
+    with pytest.raises(ValueError, match="exact_arrival: the scenario has no phase with transfer_orbits > 0"):
         fuel_optimal("keeping", exact_arrival=True)
     with pytest.raises(ValueError, match=r"exact_arrival: no thrust of at most 0\.0001 m/s\^2 .* the steps \[97\]"):
         fuel_optimal(vary("initialization", max_accel_m_s2=1e-4), exact_arrival=True)
-    with pytest.raises(ValueError, match="phase: must have transfer_periods > 0, phase 0 has none"):
+    with pytest.raises(ValueError, match="phase: must have transfer_orbits > 0, phase 0 has none"):
         impulsive_transfer("keeping")
     with pytest.raises(ValueError, match="phase: must be between 0 and 1, got 2"):
         impulsive_transfer("mission", phase=2)

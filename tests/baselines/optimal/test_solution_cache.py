@@ -17,7 +17,7 @@ from formation_env.task.scenario import Scenario
 def scenario() -> Scenario:
     """A short flight."""
     base = load_scenario("initialization")
-    phase = dataclasses.replace(base.phases[0], transfer_periods=0.1, hold_periods=0.05)
+    phase = dataclasses.replace(base.phases[0], transfer_orbits=0.1, hold_orbits=0.05)
     return dataclasses.replace(base, phases=(phase,))
 
 

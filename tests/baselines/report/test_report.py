@@ -35,8 +35,8 @@ COMMAND = "python -m baselines report --episodes 3"
 SHORT = {
     "title": "A short flight <with> a transfer & a hold",
     "phases": [
-        {"formation": {"kind": "following", "y0_m": 200}, "transfer_periods": 0.05, "hold_periods": 0.05},
-        {"formation": {"kind": "space_circle", "x0_m": 100, "vx0_m_s": 0.1}, "hold_periods": 0.05},
+        {"formation": {"kind": "following", "y0_m": 200}, "transfer_orbits": 0.05, "hold_orbits": 0.05},
+        {"formation": {"kind": "space_circle", "x0_m": 100, "vx0_m_s": 0.1}, "hold_orbits": 0.05},
     ],
     "dropout": {"kind": "bernoulli", "loss_probability": 0.3},
 }

@@ -104,7 +104,7 @@ def test_the_misprinted_frequency_gives_the_thesis_s_300_m() -> None:
 def test_the_plan_of_few_burns_is_no_dearer_than_hohmann() -> None:
     """Hohmann's is the cheapest transfer between near circles; steps of 30 s and the plan's floor cost 5 %."""
     scenario = replace(load_scenario("thesis_reconfiguration"), dynamics="hcw", dt_s=30.0)
-    phase = replace(scenario.phases[0], transfer_periods=0.0, hold_periods=0.5)
+    phase = replace(scenario.phases[0], transfer_orbits=0.0, hold_orbits=0.5)
     scenario = replace(scenario, phases=(phase,))
     n, x_m = scenario.orbit.mean_motion_rad_s, 10e3
     end = np.array([x_m, -0.75 * math.pi * x_m, 0, 0, -1.5 * n * x_m, 0])

@@ -73,7 +73,7 @@ def test_the_failure_has_its_window() -> None:
 def test_control_weights_are_swapped_everywhere() -> None:
     """A law of another weight is the shipped one with that weight alone; sliding mode has none."""
     scenario = scenarios.keeping(1.0, COARSE_S)
-    for name in ("lqr", "lqr_tracking"):
+    for name in ("lqr", "lqr_quasi_static"):
         same = scenarios.law(name, scenario, "thesis_keeping", 12000.0)
         np.testing.assert_array_equal(same.K, scenarios.law(name, scenario, "thesis_keeping").K)  # type: ignore[attr-defined]
         assert np.abs(scenarios.law(name, scenario, "thesis_keeping", 1.0).K).max() > np.abs(same.K).max()  # type: ignore[attr-defined]

@@ -24,7 +24,7 @@ from formation_env.evaluation.seeds import seeds
 from formation_env.numerics.arrays import Array
 from formation_env.settings import ConfigError, build, load_yaml
 
-BOTTOM = {"expected_cost.floor": 7e-4, "expected_cost.price_scale": 0.6, "deadband": 0.3}
+BOTTOM = {"reweighted_lqg.floor": 7e-4, "reweighted_lqg.error_weight_scale": 0.6, "deadband": 0.3}
 """Where the bowl has its least value, 0."""
 
 
@@ -91,8 +91,8 @@ def test_the_first_trial_is_the_default_gains_themselves(name: str) -> None:
 
 def test_knobs_of_a_transfer_are_for_transfers() -> None:
     """Keeping has no transfer to search for."""
-    assert len(knobs_for("lqr_tracking", load_scenario("keeping"))) == 5
-    assert len(knobs_for("lqr_tracking", load_scenario("mission"))) == 10
+    assert len(knobs_for("lqr_quasi_static", load_scenario("keeping"))) == 5
+    assert len(knobs_for("lqr_quasi_static", load_scenario("mission"))) == 10
 
 
 def test_search_finds_the_bottom(lqr: Task, tmp_path: Path) -> None:
@@ -224,9 +224,9 @@ def test_section_is_replaced_and_the_rest_is_kept() -> None:
     assert (
         replace_section(text, "lqr", new) == "# File.\n\n# New.\nlqr:\n  floor: 2\n\n# Other.\nsmc:\n  boundary_m: 3\n"
     )
-    appended = replace_section(text, "lqr_tracking", "# New.\nlqr_tracking: {}\n")
-    assert appended == f"{text}\n# New.\nlqr_tracking: {{}}\n"
-    assert replace_section(appended, "lqr_tracking", "# New.\nlqr_tracking: {}\n") == appended
+    appended = replace_section(text, "lqr_quasi_static", "# New.\nlqr_quasi_static: {}\n")
+    assert appended == f"{text}\n# New.\nlqr_quasi_static: {{}}\n"
+    assert replace_section(appended, "lqr_quasi_static", "# New.\nlqr_quasi_static: {}\n") == appended
 
 
 @pytest.mark.parametrize(
@@ -270,12 +270,12 @@ def test_gains_in_use_are_tried_too(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     """A file whose gains are the bowl's bottom keeps them, whatever the other trials; a limit of a knob is kept to."""
     monkeypatch.setattr(Task, "costs", bowl)
     path = tmp_path / "keeping.yaml"
-    path.write_text("lqr: {deadband: 0.3, expected_cost: {floor: 7e-4, price_scale: 0.6}}\n")
+    path.write_text("lqr: {deadband: 0.3, reweighted_lqg: {floor: 7e-4, error_weight_scale: 0.6}}\n")
     folders = ("--out", tmp_path, "--studies", tmp_path / "studies")
     result = tune("keeping", "--policy", "lqr", "--trials", 12, *folders)
     assert result.exit_code == 0, result.output
     assert "(trial 1; " in result.output
     assert read(load_yaml(path)["lqr"], KNOBS["lqr"]) == BOTTOM
-    path.write_text("lqr: {deadband: 0.3, expected_cost: {floor: 1e-9, price_scale: 0.6}}\n")
-    assert present_gains("lqr", path, KNOBS["lqr"]) == {**BOTTOM, "expected_cost.floor": 1e-5}
+    path.write_text("lqr: {deadband: 0.3, reweighted_lqg: {floor: 1e-9, error_weight_scale: 0.6}}\n")
+    assert present_gains("lqr", path, KNOBS["lqr"]) == {**BOTTOM, "reweighted_lqg.floor": 1e-5}
     assert present_gains("lqr", tmp_path / "none.yaml", KNOBS["lqr"]) is None

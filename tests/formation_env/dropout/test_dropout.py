@@ -56,7 +56,7 @@ def test_gilbert_elliott_has_the_mean_lengths_asked_for(seed: int) -> None:
 
     So are the losses, which are 600 s / (600 s + T/2) at any step of an ensemble that starts stationary.
     """
-    model = GilbertElliott(mean_outage_s=600.0, mean_between_periods=0.5)
+    model = GilbertElliott(mean_outage_s=600.0, mean_uptime_orbits=0.5)
     down = simulate(model.chain(DT_S, ORBIT), seed)
     before, after = down[:-1], down[1:]
     assert in_band((before & ~after).sum(), before.sum(), DT_S / 600.0)
@@ -69,7 +69,7 @@ def test_gilbert_elliott_has_the_mean_lengths_asked_for(seed: int) -> None:
 @pytest.mark.parametrize("dt_s", [1.0, 10.0, 60.0])
 def test_gilbert_elliott_means_do_not_depend_on_the_step(dt_s: float) -> None:
     """Mean lengths in seconds and the share lost are those of the settings at every step."""
-    chain = GilbertElliott(mean_outage_s=120.0, mean_between_periods=0.1).chain(dt_s, ORBIT)
+    chain = GilbertElliott(mean_outage_s=120.0, mean_uptime_orbits=0.1).chain(dt_s, ORBIT)
     assert dt_s / chain.recover == pytest.approx(120.0, rel=1e-12)
     assert dt_s / chain.fail == pytest.approx(0.1 * PERIOD_S, rel=1e-5)
     assert chain.stationary_loss == pytest.approx(120 / (120 + 0.1 * PERIOD_S), rel=1e-5)
@@ -87,7 +87,7 @@ def test_bernoulli_bounds(probability: float, share: float) -> None:
     ("model", "key"),
     [
         (GilbertElliott(mean_outage_s=29.0), "mean_outage_s: a mean of 29 s"),
-        (GilbertElliott(mean_between_periods=0.001), "mean_between_periods: a mean of 5.80123 s"),
+        (GilbertElliott(mean_uptime_orbits=0.001), "mean_uptime_orbits: a mean of 5.80123 s"),
     ],
 )
 def test_spells_shorter_than_a_step_are_refused(model: GilbertElliott, key: str) -> None:

@@ -153,8 +153,8 @@ def test_formations_of_circles_refuse_ellipses(formation: Formation) -> None:
         ({"eccentricity": 1.0}, "eccentricity: must be less than 1"),
         ({"eccentricity": 0.2}, "eccentricity: the perigee must be above 100000 m, got -795627 m"),
         (
-            {"altitude_m": 2e6, "eccentricity": 0.1, "reference": "mean"},
-            "reference: mean needs eccentricity 0, got 0.1",
+            {"altitude_m": 2e6, "eccentricity": 0.1, "mean_motion_from": "mean"},
+            "mean_motion_from: mean needs eccentricity 0, got 0.1",
         ),
     ],
 )

@@ -47,7 +47,7 @@ def coasting(scenario: Scenario, state: Array, steps: int) -> Array:
 def nonlinear_keeping(dt_s: float, periods: float, **changes: object) -> Scenario:
     """The nonlinear keeping scenario without anything random."""
     scenario = noise_free("keeping_nonlinear")
-    phases = (Phase(formation=scenario.phases[0].formation, hold_periods=periods),)
+    phases = (Phase(formation=scenario.phases[0].formation, hold_orbits=periods),)
     return dataclasses.replace(scenario, dt_s=dt_s, phases=phases, limits=Limits(max_distance_m=1e6), **changes)
 
 
@@ -166,7 +166,7 @@ def test_mean_reference_is_the_leaders_true_mean_radius() -> None:
 
     At that radius and its mean motion, the secular theory's rate of the LVLH frame u' + RAAN' cos i is n c to J2^2.
     """
-    orbit = dataclasses.replace(truth.ORBIT, reference="mean")
+    orbit = dataclasses.replace(truth.ORBIT, mean_motion_from="mean")
     assert orbit.radius_m == pytest.approx(6972235.0, abs=20)
     assert dataclasses.replace(orbit, j2=False).radius_m == truth.ORBIT.radius_m
     mean_axis = 6978137.0 - 1.5 * 1.08263e-3 * 6378136.6**2 / 6978137.0 * 0.75
@@ -183,7 +183,7 @@ def test_mean_reference_is_the_leaders_true_mean_radius() -> None:
 def test_mean_reference_reaches_the_published_errors(case: str, mean_m: float) -> None:
     """Ten orbits under J2: 224 m for the space circle, not 1053 m; 5 %, as the largest may lie between the rows."""
     times, states = truth.load(case, "j2")
-    orbit = dataclasses.replace(truth.ORBIT, reference="mean")
+    orbit = dataclasses.replace(truth.ORBIT, mean_motion_from="mean")
     modelled = propagate(states[0], times, orbit=orbit, spacecraft=Spacecraft(air_density_kg_m3=0.0))
     assert np.linalg.norm((modelled - states)[:, :3], axis=1).max() == pytest.approx(mean_m, rel=0.05)
 
@@ -225,17 +225,17 @@ def test_linear_truths_refuse_what_they_would_leave_out(changes: dict[str, objec
 
 
 def test_filter_keeps_a_linear_model() -> None:
-    """The belief is modified HCW about a circle and Yamanaka & Ankersen's about an ellipse, unless it is named."""
-    assert load_scenario("keeping_nonlinear").belief.dynamics == "modified_hcw"
-    assert load_scenario("keeping_eccentric").belief.dynamics == "yamanaka_ankersen"
+    """The filter's model is modified HCW about a circle, Yamanaka & Ankersen's about an ellipse, unless named."""
+    assert load_scenario("keeping_nonlinear").filter_model.dynamics == "modified_hcw"
+    assert load_scenario("keeping_eccentric").filter_model.dynamics == "yamanaka_ankersen"
     named = dataclasses.replace(load_scenario("keeping_eccentric"), filter=KalmanFilter(dynamics="hcw"))
-    assert named.filter_model().Phi.shape == (6, 6)
+    assert named.filter_dynamics().Phi.shape == (6, 6)
     with pytest.raises(ValueError, match="no dynamics model named 'nonlinear'"):
         dataclasses.replace(named, filter=KalmanFilter(dynamics="nonlinear"))
 
 
 def test_leader_is_the_orbits() -> None:
     """The osculating elements at t = 0 are those of the settings, whatever the reference is."""
-    orbit = Orbit(altitude_m=700e3, inclination_deg=97.0, raan_deg=10.0, true_anomaly_deg=30.0, reference="mean")
+    orbit = Orbit(altitude_m=700e3, inclination_deg=97.0, raan_deg=10.0, true_anomaly_deg=30.0, mean_motion_from="mean")
     expected = to_cartesian(Elements(7078136.6, 0.0, *np.radians([97.0, 10.0, 0.0, 30.0])))
     np.testing.assert_allclose(np.concatenate(to_cartesian(orbit.elements)), np.concatenate(expected), rtol=1e-12)

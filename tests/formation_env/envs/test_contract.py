@@ -56,7 +56,7 @@ def test_equal_seeds_give_equal_rollouts(env: FormationEnv) -> None:
     first = fly(env, actions, seed=11)
     assert_same(fly(env, actions, seed=11), first)
     scenario = env.scenario
-    is_random = scenario.start.spread_pos_m > 0 or scenario.sensor.sigma_pos_m > 0
+    is_random = scenario.start.initial_sigma_pos_m > 0 or scenario.sensor.sigma_pos_m > 0
     assert is_random == (scenario != load_scenario("thesis_initialization"))
     assert np.any(fly(env, actions, seed=12)[-1][-1]["true_state"] != first[-1][-1]["true_state"]) == is_random
 
@@ -64,7 +64,7 @@ def test_equal_seeds_give_equal_rollouts(env: FormationEnv) -> None:
 def test_two_resets_differ(env: FormationEnv) -> None:
     """Without a seed the stream goes on: the second episode is another one, and again the same one for that seed."""
     first, second = env.reset(seed=3), env.reset()
-    is_random = env.scenario.start.spread_pos_m > 0
+    is_random = env.scenario.start.initial_sigma_pos_m > 0
     assert np.any(first[1]["true_state"] != second[1]["true_state"]) == is_random
     env.reset(seed=3)
     assert_same(env.reset(), second)

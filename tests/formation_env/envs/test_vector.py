@@ -30,7 +30,7 @@ def sync(num_envs: int, scenario: Scenario) -> SyncVectorEnv:
 def keep_out() -> Scenario:
     """Followers that start near a sphere they must not enter, so that some do."""
     scenario = load_scenario("keeping")
-    start = dataclasses.replace(scenario.start, spread_pos_m=100.0, spread_vel_m_s=0.5)
+    start = dataclasses.replace(scenario.start, initial_sigma_pos_m=100.0, initial_sigma_vel_m_s=0.5)
     return dataclasses.replace(scenario, start=start, dropout=Bernoulli(), limits=Limits(keep_out_m=3850.0))
 
 
@@ -104,7 +104,7 @@ def test_reset_mask_leaves_the_others_alone() -> None:
     distance = np.linalg.norm(
         infos["true_state"][mask, :3] - scenario.start.formation.state(scenario.orbit)[:3], axis=1
     )
-    assert (distance < 5 * np.sqrt(3) * scenario.start.spread_pos_m).all()
+    assert (distance < 5 * np.sqrt(3) * scenario.start.initial_sigma_pos_m).all()
 
 
 def test_reset_mask_equals_gymnasiums() -> None:

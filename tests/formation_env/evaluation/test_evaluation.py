@@ -186,7 +186,7 @@ def test_metrics_of_a_short_flight_by_hand() -> None:
     """Two steps of hold without any noise: every metric from the two known errors."""
     scenario = load_scenario("thesis_initialization")
     target = dataclasses.replace(scenario.phases[0].formation, y0_m=40.0)
-    hold = Phase(formation=target, hold_periods=2 / scenario.orbit.period_s)
+    hold = Phase(formation=target, hold_orbits=2 / scenario.orbit.period_s)
     scenario = dataclasses.replace(scenario, phases=(hold,))
     line = evaluate(Damper(0.0), scenario, [0]).iloc[0]
     # At rest at the leader, where nothing moves: 40 m from the target, and more than the 30 m that are tolerated.

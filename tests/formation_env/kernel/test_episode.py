@@ -118,7 +118,7 @@ REWARDS = {
     "keeping": load_scenario("keeping"),
     "mission": load_scenario("mission"),
     "transfer": weighted("reconfiguration", transfer_error_weight=0.003, error_weight=0.02),
-    "quadratic": weighted("mission", shape="quadratic", quadratic_scale_m=300.0, transfer_error_weight=0.001),
+    "quadratic": weighted("mission", error_cost="quadratic", quadratic_scale_m=300.0, transfer_error_weight=0.001),
 }
 
 
@@ -126,7 +126,7 @@ REWARDS = {
 def test_reward_is_minus_delta_v_and_priced_error(scenario: Scenario) -> None:
     """r = -(|u| dt + w e dt / T_hold), e against the reference of the phase that the step belongs to."""
     instants, reward = plan(scenario), scenario.reward
-    hold_steps = sum(steps_of(phase.hold_periods, scenario) for phase in scenario.phases)
+    hold_steps = sum(steps_of(phase.hold_orbits, scenario) for phase in scenario.phases)
     actions = 0.1 * random_actions(4, len(instants) - 1)
     results = fly(FormationEnv(scenario), actions, seed=2)
     assert len(results) == len(instants)
@@ -134,7 +134,7 @@ def test_reward_is_minus_delta_v_and_priced_error(scenario: Scenario) -> None:
     for action, result, instant, phase in zip(actions, results[1:], instants[1:], in_force, strict=True):
         _, value, terminated, _, info = result
         error = np.linalg.norm(info["true_state"][:3] - instant.reference[:3])
-        shaped = error if reward.shape == "linear" else error**2 / reward.quadratic_scale_m
+        shaped = error if reward.error_cost == "linear" else error**2 / reward.quadratic_scale_m
         weight = reward.error_weight if instant.held else reward.transfer_error_weight
         delta_v = scenario.spacecraft.max_accel_m_s2 * np.linalg.norm(action.astype(float)) * scenario.dt_s
         assert not terminated
@@ -193,7 +193,7 @@ def test_totals_are_the_sums_of_what_each_step_told(scenario: Scenario, strength
     assert totals["return"] == pytest.approx(-cost, rel=1e-9)
 
 
-@pytest.mark.parametrize("reward", [Reward(), Reward(shape="quadratic", transfer_error_weight=0.002)])
+@pytest.mark.parametrize("reward", [Reward(), Reward(error_cost="quadratic", transfer_error_weight=0.002)])
 def test_leaving_never_pays(reward: Reward) -> None:
     """An early end costs at least what staying at the distance limit, without any thrust, to the end would."""
     scenario = dataclasses.replace(noise_free("reconfiguration"), reward=reward, limits=Limits(max_distance_m=9000.0))
@@ -201,7 +201,7 @@ def test_leaving_never_pays(reward: Reward) -> None:
     _, value, terminated, truncated, info = results[-1]
     instants = plan(scenario)[len(results) :]
     weights = [reward.error_weight if instant.held else reward.transfer_error_weight for instant in instants]
-    shaped = 9000.0 if reward.shape == "linear" else 9000.0**2 / reward.quadratic_scale_m
+    shaped = 9000.0 if reward.error_cost == "linear" else 9000.0**2 / reward.quadratic_scale_m
     hold_steps = steps_of(0.35, scenario)
     assert (terminated, truncated) == (True, False)
     assert info["position_error_m"] > 9000 >= results[-2][-1]["position_error_m"]
@@ -212,7 +212,7 @@ def test_leaving_never_pays(reward: Reward) -> None:
 
 def test_the_keep_out_sphere_ends_the_episode() -> None:
     """At the first instant inside it, at the cost of the distance limit; the start lies outside."""
-    target = Phase(formation=Following(y0_m=500.0), hold_periods=1.0)
+    target = Phase(formation=Following(y0_m=500.0), hold_orbits=1.0)
     scenario = dataclasses.replace(
         noise_free("keeping"), phases=(target,), limits=Limits(keep_out_m=400.0, max_distance_m=5000.0)
     )

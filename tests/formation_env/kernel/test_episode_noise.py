@@ -81,7 +81,7 @@ def test_process_noise_is_a_held_white_acceleration() -> None:
     moved = np.array([propagate(x, [30.0], orbit=scenario.orbit, spacecraft=scenario.spacecraft)[:, 0] for x in truth])
     excess = (truth[1:] - moved[:-1]).reshape(-1, 6)
     # Columns of Gamma: what a unit acceleration along each axis does over a step, by the exact linear model.
-    Gamma = scenario.true_model().Gamma
+    Gamma = scenario.true_dynamics().Gamma
     noise, residual, *_ = np.linalg.lstsq(Gamma, excess.T, rcond=None)
     assert residual.max() < 1e-12
     np.testing.assert_allclose(Gamma[[0, 1, 2], [0, 1, 2]], 30**2 / 2, rtol=1e-3)
@@ -125,7 +125,7 @@ def test_bursts_have_their_mean_length_and_spacing() -> None:
     At the start the chain is stationary: down with mean outage / (mean outage + mean between).
     """
     scenario = dataclasses.replace(
-        load_scenario("keeping"), dropout=GilbertElliott(mean_outage_s=300.0, mean_between_periods=0.2)
+        load_scenario("keeping"), dropout=GilbertElliott(mean_outage_s=300.0, mean_uptime_orbits=0.2)
     )
     between_s = 0.2 * 2 * np.pi / scenario.orbit.mean_motion_rad_s
     lost = ~collect(fly_rows(FormationVectorEnv(ROWS, scenario), still(ROWS, 380), seed=0), "measured")
@@ -216,8 +216,8 @@ def test_filter_flies_by_the_model_it_is_given() -> None:
 
 def test_filter_believes_the_noise_it_is_told() -> None:
     """The first update with its own sigmas: P = (1 / P0 + 1 / R)^-1 on each axis."""
-    belief = KalmanFilter(sigma_pos_m=7.0, sigma_vel_m_s=0.5, initial_sigma_pos_m=3.0, initial_sigma_vel_m_s=0.25)
-    scenario = dataclasses.replace(load_scenario("keeping"), filter=belief, dropout=NoDropout())
+    filter_model = KalmanFilter(sigma_pos_m=7.0, sigma_vel_m_s=0.5, initial_sigma_pos_m=3.0, initial_sigma_vel_m_s=0.25)
+    scenario = dataclasses.replace(load_scenario("keeping"), filter=filter_model, dropout=NoDropout())
     env = FormationVectorEnv(2, scenario)
     env.reset(seed=0)
     expected = 1 / (np.repeat([3, 0.25], 3) ** -2.0 + np.repeat([7, 0.5], 3) ** -2.0)

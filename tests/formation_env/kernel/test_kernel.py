@@ -36,16 +36,16 @@ def unpacked(settings):  # type: ignore[no-untyped-def]
 @pytest.mark.parametrize("name", scenario_names())
 def test_unpack_reads_what_pack_wrote(name: str) -> None:
     """The same numbers in the same named places, for every element."""
-    belief = KalmanFilter(dynamics="hcw", sigma_pos_m=3.0, process_noise_m_s2=1e-4)
-    scenario = dataclasses.replace(load_scenario(name), filter=belief)
+    filter_model = KalmanFilter(dynamics="hcw", sigma_pos_m=3.0, process_noise_m_s2=1e-4)
+    scenario = dataclasses.replace(load_scenario(name), filter=filter_model)
     settings = packing.pack(scenario)
     groups = unpacked(settings)
     flat = np.concatenate([np.ravel(values) for group in groups for values in group])
     np.testing.assert_array_equal(flat, settings)
     truth, believed, _, sensor, _, scalars = groups
-    models = [(believed, scenario.filter_model())]
+    models = [(believed, scenario.filter_dynamics())]
     if scenario.dynamics != NONLINEAR:
-        models.append((truth, scenario.true_model()))
+        models.append((truth, scenario.true_dynamics()))
     for model, expected in models:
         Phi, Gamma = np.zeros((6, 6)), np.zeros((6, 3))
         Phi[np.ix_([0, 1, 3, 4], [0, 1, 3, 4])] = np.reshape(model.Phi_in_plane, (4, 4))
@@ -180,7 +180,7 @@ def test_the_program_carries_the_hash_of_its_sources() -> None:
 @pytest.mark.parametrize("varied", [False, True])
 def test_programs_close_over_numbers_only(varied: bool) -> None:
     """numba's cache takes what a function closes over into its key; a function there is another in each process."""
-    for function in program.program(packing.CONSTANT_MODEL, packing.CONSTANT_MODEL, varied):
+    for function in program.program(packing.TIME_INVARIANT, packing.TIME_INVARIANT, varied):
         cells = [cell.cell_contents for cell in function.py_func.__closure__]
         assert all(type(cell) in (int, bool) for cell in cells)
 

@@ -23,7 +23,7 @@ SCENARIOS = {
     "other belief": dataclasses.replace(
         load_scenario("bx1_companion"),
         filter=KalmanFilter(dynamics="hcw"),
-        dropout=GilbertElliott(mean_outage_s=300.0, mean_between_periods=0.1),
+        dropout=GilbertElliott(mean_outage_s=300.0, mean_uptime_orbits=0.1),
     ),
 }
 
@@ -73,8 +73,8 @@ def clock(scenario: Scenario) -> Array:
     """Start, arrival and end step of each phase (phases, 3)."""
     table, end = [], 0
     for phase in scenario.phases:
-        arrival = end + steps_of(phase.transfer_periods, scenario)
-        table.append((end, arrival, arrival + steps_of(phase.hold_periods, scenario)))
+        arrival = end + steps_of(phase.transfer_orbits, scenario)
+        table.append((end, arrival, arrival + steps_of(phase.hold_orbits, scenario)))
         end = table[-1][2]
     return np.array(table)
 
@@ -141,15 +141,15 @@ def test_arrival_error_is_where_the_estimate_coasts_to(flight: Flight) -> None:
             spacecraft=scenario.spacecraft,
             leader_spacecraft=scenario.leader,
         )[:, 0]
-        assert_states(layout.state(flight.seen[k], "arrival_error"), there - goal[k], scale)
+        assert_states(layout.state(flight.seen[k], "zero_effort_miss"), there - goal[k], scale)
     held = flight.steps >= arrival
-    np.testing.assert_array_equal(flight["arrival_error"][held], flight["error"][held])
+    np.testing.assert_array_equal(flight["zero_effort_miss"][held], flight["error"][held])
 
 
 def test_compressed_errors_are_the_logarithm_of_the_errors(flight: Flight) -> None:
     """sign(e) log(1 + |e| / unit) / log(1 + 1e4), in m and mm/s; what one mm is worth in the linear block bounds it."""
     layout, units = observation_layout(flight.scenario), np.repeat([1, 1e-3], 3)
-    for name in ("error", "arrival_error"):
+    for name in ("error", "zero_effort_miss"):
         error = layout.state(flight.seen, name) / units
         within = np.abs(flight[name]) < BOUND
         slack = 10 * FLOAT32 * (layout.state_scale / units * np.maximum(np.abs(flight[name]), 1))

@@ -22,10 +22,10 @@ VARIANTS = 64
 
 
 @cache
-def short(name: str = "keeping_randomized", hold_periods: float = 0.15) -> Scenario:
+def short(name: str = "keeping_randomized", hold_orbits: float = 0.15) -> Scenario:
     """Holds of 27 to 31 steps, by the variant's orbit."""
     scenario = load_scenario(name)
-    phases = tuple(dataclasses.replace(phase, hold_periods=hold_periods) for phase in scenario.phases)
+    phases = tuple(dataclasses.replace(phase, hold_orbits=hold_orbits) for phase in scenario.phases)
     return dataclasses.replace(scenario, phases=phases)
 
 
@@ -109,11 +109,11 @@ def values_of(scenario: Scenario, variant: Scenario) -> dict[str, float]:
     drag, leaders = (s.spacecraft.drag_area_per_mass_m2_kg for s in (variant, scenario))
     return {
         "formation_size_factor": formation.x0_m / nominal.x0_m,  # type: ignore[attr-defined]
-        "start_spread_factor": variant.start.spread_vel_m_s / scenario.start.spread_vel_m_s,
+        "start_spread_factor": variant.start.initial_sigma_vel_m_s / scenario.start.initial_sigma_vel_m_s,
         "sensor_noise_factor": variant.sensor.sigma_pos_m / scenario.sensor.sigma_pos_m,
         "process_noise_factor": variant.process_noise_m_s2 / scenario.process_noise_m_s2,
         "outage_length_factor": variant.dropout.mean_outage_s / scenario.dropout.mean_outage_s,  # type: ignore[attr-defined]
-        "outage_spacing_factor": variant.dropout.mean_between_periods / scenario.dropout.mean_between_periods,  # type: ignore[attr-defined]
+        "outage_spacing_factor": variant.dropout.mean_uptime_orbits / scenario.dropout.mean_uptime_orbits,  # type: ignore[attr-defined]
         "max_accel_factor": variant.spacecraft.max_accel_m_s2 / scenario.spacecraft.max_accel_m_s2,
         "ballistic_coefficient_factor": leaders / drag,
         "altitude_m": variant.orbit.altitude_m,
@@ -193,7 +193,9 @@ def test_the_draw_is_independent_of_the_episodes_noises() -> None:
     info = env.reset(seed=7)[1]
     nominal = np.array([variant.start.formation.state(variant.orbit) for variant in draw_variants(scenario)])
     errors = info["true_state"] - nominal[info["variant"]]
-    errors /= np.array([variant.start.spread_pos_m for variant in draw_variants(scenario)])[info["variant"], None]
+    errors /= np.array([variant.start.initial_sigma_pos_m for variant in draw_variants(scenario)])[
+        info["variant"], None
+    ]
     columns = np.column_stack([info["variant"], errors, np.abs(errors), info["measured"]])
     correlation = stats.spearmanr(columns).statistic[0, 1:]
     assert np.abs(correlation).max() < 5 / np.sqrt(4000)
@@ -276,7 +278,7 @@ def test_the_picture_is_that_of_the_variant() -> None:
     np.testing.assert_array_equal(env.render(), plain.render())
 
 
-BASE = "phases: [{formation: {kind: following}, hold_periods: 1}]\ndomain_randomization: "
+BASE = "phases: [{formation: {kind: following}, hold_orbits: 1}]\ndomain_randomization: "
 # What is in the file, and what the one line of the error says after the file's name.
 FAULTS = {
     "unknown key": ("{altitude: [1, 2]}", "domain_randomization.altitude: unknown key; did you mean 'altitude_m'\\?"),
@@ -325,7 +327,7 @@ def test_faults_are_one_line_that_names_key_and_value(fault: str, tmp_path: Path
 def test_bernoullis_probability_is_varied() -> None:
     """The one quantity that the shipped scenario has not."""
     data = {
-        "phases": [{"formation": {"kind": "following"}, "hold_periods": 1}],
+        "phases": [{"formation": {"kind": "following"}, "hold_orbits": 1}],
         "dropout": {"kind": "bernoulli", "loss_probability": 0.2},
         "domain_randomization": {"variants": 8, "loss_probability_factor": [0, 5]},
     }

@@ -12,7 +12,7 @@ from formation_env.formations import AtLeader, Following, SpaceCircle
 from formation_env.task.loading import config_folder
 from formation_env.task.scenario import Limits, Phase, Start
 
-PHASES = "phases: [{formation: {kind: following}, hold_periods: 1}]\n"
+PHASES = "phases: [{formation: {kind: following}, hold_orbits: 1}]\n"
 
 
 def write(folder: Path, text: str | bytes) -> Path:
@@ -42,7 +42,7 @@ def test_registered_ids_have_scenarios_of_the_table() -> None:
         scenario = load_scenario(ENV_IDS[env_id])
         assert scenario.dt_s == 30
         assert scenario.spacecraft.max_accel_m_s2 == max_accel
-        assert [(p.transfer_periods, p.hold_periods) for p in scenario.phases] == phases
+        assert [(p.transfer_orbits, p.hold_orbits) for p in scenario.phases] == phases
     assert len(ENV_IDS) == len(expected)
 
 
@@ -72,7 +72,7 @@ def test_a_scenario_is_frozen_and_hashable() -> None:
     with pytest.raises(dataclasses.FrozenInstanceError):
         scenario.dt_s = 1.0  # type: ignore[misc]
     with pytest.raises(dataclasses.FrozenInstanceError):
-        scenario.phases[0].hold_periods = 1.0  # type: ignore[misc]
+        scenario.phases[0].hold_orbits = 1.0  # type: ignore[misc]
     assert hash(scenario) == hash(load_scenario("mission"))
 
 
@@ -88,7 +88,7 @@ def test_replace_checks_again() -> None:
 @pytest.mark.parametrize(("dt_s", "expected"), [(1.0, 2901), (7.0, 414), (30.0, 97), (1000.0, 3), (5000.0, 1)])
 def test_phases_are_whole_steps(dt_s: float, expected: int) -> None:
     """Half a period is 2900.6 s at 600 km; a step that does not divide it gets the nearest number of steps."""
-    phase = Phase(formation=Following(), transfer_periods=0.5, hold_periods=0.5)
+    phase = Phase(formation=Following(), transfer_orbits=0.5, hold_orbits=0.5)
     scenario = Scenario(phases=(phase, phase), dt_s=dt_s, dropout={"kind": "none"})  # type: ignore[arg-type]
     half_period_s = 3.14159265 / mean_motion(scenario)
     assert abs(expected * dt_s - half_period_s) <= dt_s / 2
@@ -134,10 +134,10 @@ FAULTS = {
     "leader's key": (PHASES + "leader_spacecraft: {mass: 1}\n", "leader_spacecraft.mass: unknown key; .*'mass_kg'?"),
     "phase's key": (
         phase(f"{FOLLOWING}, hold_period: 1"),
-        "phases.0.hold_period: unknown key; did you mean 'hold_periods'?",
+        "phases.0.hold_period: unknown key; did you mean 'hold_orbits'?",
     ),
     "formation's key": (
-        phase("formation: {kind: following, y_m: 1}, hold_periods: 1"),
+        phase("formation: {kind: following, y_m: 1}, hold_orbits: 1"),
         "phases.0.formation.y_m: unknown key; did you mean 'y0_m'?",
     ),
     "window's key": (
@@ -164,25 +164,25 @@ FAULTS = {
     "inclination": (PHASES + "orbit: {inclination_deg: 181}\n", "orbit.inclination_deg: must be .* 180, got 181"),
     "no phases": ("dt_s: 30\n", "phases: required but missing"),
     "empty phases": ("phases: []\n", "phases: must have at least one phase, got []"),
-    "phases as mapping": ("phases: {hold_periods: 1}\n", "phases: must be a list, got {'hold_periods': 1}"),
+    "phases as mapping": ("phases: {hold_orbits: 1}\n", "phases: must be a list, got {'hold_orbits': 1}"),
     "phase as number": ("phases: [3]\n", "phases.0: must be a mapping, got 3"),
-    "no hold": (phase(FOLLOWING), "phases.0.hold_periods: required but missing"),
-    "no formation": (phase("hold_periods: 1"), "phases.0.formation: required but missing"),
-    "hold of zero": (phase(f"{FOLLOWING}, hold_periods: 0"), "phases.0.hold_periods: must be greater than 0, got 0"),
+    "no hold": (phase(FOLLOWING), "phases.0.hold_orbits: required but missing"),
+    "no formation": (phase("hold_orbits: 1"), "phases.0.formation: required but missing"),
+    "hold of zero": (phase(f"{FOLLOWING}, hold_orbits: 0"), "phases.0.hold_orbits: must be greater than 0, got 0"),
     "transfer backwards": (
-        phase(f"{FOLLOWING}, hold_periods: 1, transfer_periods: -1"),
-        "phases.0.transfer_periods: must be greater than or equal to 0, got -1",
+        phase(f"{FOLLOWING}, hold_orbits: 1, transfer_orbits: -1"),
+        "phases.0.transfer_orbits: must be greater than or equal to 0, got -1",
     ),
     "unknown formation": (
-        phase("formation: {kind: folowing}, hold_periods: 1"),
+        phase("formation: {kind: folowing}, hold_orbits: 1"),
         "phases.0.formation.kind: unknown kind 'folowing'; did you mean 'following'?",
     ),
     "formation without kind": (
-        phase("formation: {y0_m: 1}, hold_periods: 1"),
+        phase("formation: {y0_m: 1}, hold_orbits: 1"),
         "phases.0.formation.kind: missing; known: at_leader, following, .*",
     ),
     "formation as word": (
-        phase("formation: following, hold_periods: 1"),
+        phase("formation: following, hold_orbits: 1"),
         "phases.0.formation: must be a mapping with a kind (at_leader, .*), got the string 'following'",
     ),
     "unknown start": (
@@ -218,8 +218,8 @@ FAULTS = {
         "dropout.mean_outage_s: a mean of 10 s is shorter than the step dt_s = 30 s",
     ),
     "outages too often": (
-        dropout("kind: gilbert_elliott, mean_between_periods: 0.001"),
-        "dropout.mean_between_periods: a mean of 5.80.* s is shorter than the step dt_s = 30 s",
+        dropout("kind: gilbert_elliott, mean_uptime_orbits: 0.001"),
+        "dropout.mean_uptime_orbits: a mean of 5.80.* s is shorter than the step dt_s = 30 s",
     ),
     "unknown dynamics": (
         PHASES + "dynamics: modified_hwc\n",
@@ -230,15 +230,15 @@ FAULTS = {
         "filter.dynamics: no dynamics model named 'hwc'; did you mean 'hcw'?",
     ),
     "hold below a step": (
-        phase(f"{FOLLOWING}, hold_periods: 0.001"),
-        "phases.0.hold_periods: 0.001 periods are 5.801 s, which rounds to no step of dt_s = 30 s",
+        phase(f"{FOLLOWING}, hold_orbits: 0.001"),
+        "phases.0.hold_orbits: 0.001 periods are 5.801 s, which rounds to no step of dt_s = 30 s",
     ),
     "transfer below a step": (
-        phase(f"{FOLLOWING}, hold_periods: 1}}, {{{FOLLOWING}, transfer_periods: 0.001, hold_periods: 1"),
-        "phases.1.transfer_periods: 0.001 periods are 5.801 s, which rounds to no step of dt_s = 30 s",
+        phase(f"{FOLLOWING}, hold_orbits: 1}}, {{{FOLLOWING}, transfer_orbits: 0.001, hold_orbits: 1"),
+        "phases.1.transfer_orbits: 0.001 periods are 5.801 s, which rounds to no step of dt_s = 30 s",
     ),
     "too many steps": (PHASES + "dt_s: 0.001\n", "dt_s: 5801231 steps of 0.001 s; an episode has at most 1000000"),
-    "endless hold": (phase(f"{FOLLOWING}, hold_periods: 1e306"), "dt_s: .* steps of 30 s; an episode has at most .*"),
+    "endless hold": (phase(f"{FOLLOWING}, hold_orbits: 1e306"), "dt_s: .* steps of 30 s; an episode has at most .*"),
     "dead thruster": (
         PHASES + "spacecraft: {min_accel_m_s2: 1}\n",
         "spacecraft.min_accel_m_s2: must not be above the greatest thrust, 0.1732, got 1",
@@ -253,8 +253,8 @@ FAULTS = {
     ),
     "unknown sensor": (PHASES + "sensor: {measures: speed}\n", "sensor.measures: must be .*, got the string 'speed'"),
     "unknown shape": (
-        PHASES + "reward: {shape: cubic}\n",
-        "reward.shape: must be 'linear' or 'quadratic', got the string 'cubic'",
+        PHASES + "reward: {error_cost: cubic}\n",
+        "reward.error_cost: must be 'linear' or 'quadratic', got the string 'cubic'",
     ),
     "list for mapping": (PHASES + "sensor: [1, 2]\n", "sensor: must be a mapping, got [1, 2]"),
     "file is a list": ("- 1\n", "(top level): must be a mapping, got [1]"),
@@ -306,9 +306,9 @@ def test_a_path_that_cannot_be_read_is_named(tmp_path: Path) -> None:
 
 def test_the_start_may_lie_just_within_the_limits() -> None:
     """At the limits' edge the first step does not end the episode, so the scenario stands."""
-    hold = Phase(formation=Following(y0_m=2000.0), hold_periods=1.0)
+    hold = Phase(formation=Following(y0_m=2000.0), hold_orbits=1.0)
     assert Scenario(phases=(hold,), limits=Limits(max_distance_m=2000.0)).start.formation == AtLeader()
     circle = SpaceCircle()
-    orbiting = Phase(formation=circle, hold_periods=1.0)
+    orbiting = Phase(formation=circle, hold_orbits=1.0)
     limits = Limits(keep_out_m=3900.0, max_distance_m=1.0)
     assert Scenario(phases=(orbiting,), start=Start(formation=circle), limits=limits).num_steps == 193

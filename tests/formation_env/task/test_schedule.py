@@ -32,7 +32,7 @@ def column(scenario: Scenario, name: str) -> Array:
 def every_formation() -> Scenario:
     """Transfers to a formation that rests, one that drifts and two that circle, each by a step that does not divide."""
     formations = (Following(y0_m=-700.0), Parallel(x0_m=300.0), ProjectedCircle(vx0_m_s=0.7), InTrack(y0_m=900.0))
-    phases = tuple(Phase(formation=f, transfer_periods=0.3, hold_periods=0.21) for f in formations)
+    phases = tuple(Phase(formation=f, transfer_orbits=0.3, hold_orbits=0.21) for f in formations)
     return Scenario(phases=phases, dt_s=47.0, reward=Reward(transfer_error_weight=0.003, error_weight=0.02))
 
 
@@ -43,8 +43,8 @@ def test_the_plan_is_the_clock_in_whole_steps(name: str) -> None:
     end = 0
     for index, (leg, phase) in enumerate(zip(legs(scenario), scenario.phases, strict=True)):
         assert (leg.index, leg.start) == (index, end)
-        assert leg.arrival - leg.start == steps_of(phase.transfer_periods, scenario)
-        assert leg.end - leg.arrival == steps_of(phase.hold_periods, scenario)
+        assert leg.arrival - leg.start == steps_of(phase.transfer_orbits, scenario)
+        assert leg.end - leg.arrival == steps_of(phase.hold_orbits, scenario)
         end = leg.end
     assert end == scenario.num_steps == len(build_schedule(scenario)) - 1
 
@@ -76,7 +76,7 @@ def test_each_step_is_judged_by_the_phase_it_belongs_to(scenario: Scenario) -> N
     price[0] = 0  # no step leads to the start
     positions = [instant.reference[:3] for instant in expected]
     np.testing.assert_allclose(columns(scenario, "scored_position"), positions, rtol=1e-9, atol=LONG_M)
-    np.testing.assert_allclose(column(scenario, "error_price"), price, rtol=1e-12)
+    np.testing.assert_allclose(column(scenario, "error_weight"), price, rtol=1e-12)
     np.testing.assert_array_equal(column(scenario, "counts"), held)
 
 
@@ -85,7 +85,7 @@ def test_hold_prices_sum_to_the_error_weight(name: str) -> None:
     """So that the return is -(delta-v + weight * mean error of the hold)."""
     scenario = load_scenario(name)
     assert scenario.reward.transfer_error_weight == 0
-    assert column(scenario, "error_price").sum() == pytest.approx(scenario.reward.error_weight, rel=1e-9)
+    assert column(scenario, "error_weight").sum() == pytest.approx(scenario.reward.error_weight, rel=1e-9)
 
 
 def test_transfer_prices_are_per_hold_time() -> None:
@@ -94,10 +94,10 @@ def test_transfer_prices_are_per_hold_time() -> None:
     moving = sum(leg.arrival - leg.start for leg in legs(scenario))
     holding = sum(leg.end - leg.arrival for leg in legs(scenario))
     expected = scenario.reward.error_weight + scenario.reward.transfer_error_weight * moving / holding
-    assert column(scenario, "error_price").sum() == pytest.approx(expected, rel=1e-12)
+    assert column(scenario, "error_weight").sum() == pytest.approx(expected, rel=1e-12)
 
 
-@pytest.mark.parametrize(("name", "left"), [("error_price", "price_left"), ("counts", "counts_left")])
+@pytest.mark.parametrize(("name", "left"), [("error_weight", "weight_left"), ("counts", "counts_left")])
 def test_what_is_left_is_the_sum_of_what_comes_later(name: str, left: str) -> None:
     """An early end is charged for exactly the steps that were not flown."""
     scenario = every_formation()
@@ -166,6 +166,6 @@ def test_length_scale_is_the_farthest_place_of_the_plan() -> None:
     scenario = load_scenario("reconfiguration")
     held = [np.linalg.norm(i.reference[:3]) for i in plan(scenario) if i.held]
     assert observation_layout(scenario).length_m == pytest.approx(max(5000, *held), rel=1e-6)
-    near = Scenario(phases=(Phase(formation=Following(y0_m=30.0), hold_periods=1.0),))
+    near = Scenario(phases=(Phase(formation=Following(y0_m=30.0), hold_orbits=1.0),))
     assert observation_layout(near).length_m == pytest.approx(50e3 / 30)
     assert observation_layout(dataclasses.replace(near, limits=Limits(max_distance_m=9e3))).length_m == 1000

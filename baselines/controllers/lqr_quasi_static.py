@@ -20,7 +20,7 @@ from formation_env.task.schedule import Leg, legs
 
 @settings
 class LQRTrackingSettings:
-    """Gains of `lqr_tracking`.
+    """Gains of `lqr_quasi_static`.
 
     Attributes:
         guidance: the desired path, see `baselines.design.guidance`.
@@ -36,7 +36,7 @@ class LQRTrackingSettings:
     transfer: Weights = Weights(control_s2=(0.5, 0.5, 0.5))
 
 
-class LQRTracking(AccelerationPolicy):
+class LQRQuasiStatic(AccelerationPolicy):
     """u = -R^-1 B' P x + R^-1 B' g with C = I (Ma 2009, eq. 4.17-4.19), by the filter's continuous model."""
 
     Settings = LQRTrackingSettings
@@ -94,17 +94,19 @@ def _quasi_static(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]
 
 def continuous_model(scenario: Scenario) -> tuple[Array, Array]:
     """A (6, 6), or (num_steps, 6, 6) if it varies, and B (6, 3) that the filter believes."""
-    belief = scenario.belief
+    filter_model = scenario.filter_model
     times_s = scenario.dt_s * np.arange(scenario.num_steps)
-    return get_dynamics(belief.dynamics).state_matrix(belief.orbit, belief.spacecraft, times_s), control_matrix()
+    return get_dynamics(filter_model.dynamics).state_matrix(
+        filter_model.orbit, filter_model.spacecraft, times_s
+    ), control_matrix()
 
 
 def _integrate_leg(scenario: Scenario, leg: Leg, gains: LQRTrackingSettings, desired: Array) -> tuple[Array, Array]:
     """Gains and pulls of a phase by integration; after it the error is weighed as if it went on."""
     (A, B), steps = continuous_model(scenario), np.arange(leg.start, leg.end + 1)
     if A.ndim != 2:
-        model = scenario.belief.dynamics
-        raise ConfigError(f"lqr_tracking.feedforward: integrated needs a model that does not vary, got {model}")
+        model = scenario.filter_model.dynamics
+        raise ConfigError(f"lqr_quasi_static.feedforward: integrated needs a model that does not vary, got {model}")
     P = continuous_gain(A, B, gains.hold.Q(), gains.hold.R(scenario.orbit))[1]
     g = P @ desired[-1]
     K, pull = np.zeros((leg.end - leg.start, 3, 6)), np.zeros((leg.end - leg.start, 3))
