@@ -10,6 +10,7 @@ from pathlib import Path
 import gymnasium
 import numpy as np
 import pytest
+from env_helpers import restless
 from gymnasium.wrappers import RecordVideo
 from matplotlib import pyplot
 from numpy.typing import NDArray
@@ -18,7 +19,9 @@ import formation_env
 from formation_env import FormationEnv, load_scenario
 from formation_env.dropout.windows import Window, Windows
 from formation_env.evaluation.snapshot import save_frame
+from formation_env.rendering.moment import Moment
 from formation_env.rendering.renderer import Renderer
+from formation_env.rendering.scene import Scene, _readable
 
 ACTION = np.array([0.5, -0.5, 0.5], np.float32)
 
@@ -155,6 +158,91 @@ def test_record_video_writes_a_film(tmp_path: Path) -> None:
     env.close()
     (film,) = tmp_path.glob("films/*.mp4")
     assert film.read_bytes()[4:8] == b"ftyp"
+
+
+def test_the_trail_holds_every_step() -> None:
+    """A frame at the end of a flight equals that of a flight in which every step was drawn."""
+    drawn, once = _started(steps=7), FormationEnv("keeping", render_mode="rgb_array")
+    once.reset(seed=1)
+    for _ in range(7):
+        once.step(ACTION)
+    np.testing.assert_array_equal(once.render(), drawn.render())
+
+
+def test_steps_record_nothing_without_a_render_mode() -> None:
+    """Who does not draw does not pay."""
+    env = FormationEnv("keeping")
+    env.reset(seed=1)
+    assert env._trail is None
+
+
+@pytest.mark.parametrize("backend", ["inline", "module://matplotlib_inline.backend_inline"])
+def test_human_mode_in_a_notebook_says_so(monkeypatch: pytest.MonkeyPatch, backend: str) -> None:
+    """The inline backend shows a figure once and closes it: refused, with the way out."""
+    monkeypatch.setattr("matplotlib.get_backend", lambda: backend)
+    with pytest.raises(
+        RuntimeError, match=r"\Arender_mode: 'human' needs a display.*still pictures only; use 'rgb_array'"
+    ):
+        FormationEnv("keeping", render_mode="human").reset(seed=1)
+
+
+@pytest.mark.parametrize(
+    ("value", "decimals", "text"),
+    [
+        (0.0, 2, "0.00"),
+        (0.00321, 1, "0.0032"),
+        (0.96, 1, "0.96"),
+        (12.34, 1, "12.3"),
+        (0.0457, 2, "0.046"),
+        (0.457, 2, "0.46"),
+        (4.5e-7, 3, "4.5e-07"),
+        (1.2346, 3, "1.235"),
+    ],
+)
+def test_small_numbers_keep_two_digits(value: float, decimals: int, text: str) -> None:
+    """A good sensor's sigma and a weak thruster's thrust are not shown as zero."""
+    assert _readable(value, decimals) == text
+
+
+def test_a_frame_of_good_sensors_and_weak_thrusters_shows_their_numbers() -> None:
+    """No number of the header but an exact zero is shown as zero."""
+    scenario = load_scenario("keeping")
+    scene = Scene(replace(scenario, spacecraft=replace(scenario.spacecraft, max_accel_m_s2=1e-6)))
+    moment = Moment(
+        step=3,
+        truth=np.zeros(3),
+        estimate=np.zeros(3),
+        covariance=np.diag([1e-6, 1e-6, 1e-6]),
+        thrust=np.array([1.0, 0, 0]),
+        measured=True,
+        age_s=0.0,
+        position_error_m=0.002,
+        delta_v_m_s=3e-5,
+    )
+    assert scene._values(moment)[3:] == ["0.002 m", "0.001 m", "0.001 mm/s²", "3e-05 m/s"]
+
+
+@pytest.mark.parametrize(
+    ("out", "steps", "message"),
+    [
+        ("a.txt", 1, r"\Aout: must end in \.png, got '.*a\.txt'\Z"),
+        ("a", 1, r"out: must end in \.png"),
+        ("a.png", 100_000, r"\Asteps: must be between 0 and the plan's 1015, got 100000\Z"),
+        ("a.png", -1, r"steps: must be between 0 and"),
+    ],
+)
+def test_save_frame_refuses_what_it_cannot_do(tmp_path: Path, out: str, steps: int, message: str) -> None:
+    """One line, before anything is flown or written."""
+    with pytest.raises(ValueError, match=message.replace("1015", str(load_scenario("keeping").num_steps))):
+        save_frame(tmp_path / out, "keeping", steps)
+    assert not list(tmp_path.iterdir())
+
+
+def test_save_frame_says_that_a_limit_ended_the_flight(tmp_path: Path) -> None:
+    """The frame is of the last step there was."""
+    with pytest.warns(UserWarning, match=r"the flight ended at step \d+ of 25, beyond a limit"):
+        save_frame(tmp_path / "a.png", restless(150.0), 25)
+    assert (tmp_path / "a.png").exists()
 
 
 def test_save_frame_writes_the_last_frame(tmp_path: Path) -> None:
