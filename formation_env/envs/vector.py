@@ -60,12 +60,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             ConfigError: the scenario is wrong.
             ValueError: no rows, a render mode, an unknown autoreset mode or no steps.
         """
-        if num_envs < 1:
-            raise ValueError(f"num_envs: must be at least 1, got {num_envs}")
-        if render_mode is not None:
-            raise ValueError(f"render_mode: the batched environment has none, got {render_mode!r}")
-        if max_episode_steps is not None and max_episode_steps < 1:
-            raise ValueError(f"max_episode_steps: must be at least 1, got {max_episode_steps}")
+        _check_arguments(num_envs, render_mode, max_episode_steps)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.scenario = load_scenario(scenario)
@@ -220,6 +215,16 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
                 spread[name][rows] = value
             spread[f"_{name}"] = mask
         return spread
+
+
+def _check_arguments(num_envs: int, render_mode: str | None, max_episode_steps: int | None) -> None:
+    """Refuse no rows, a render mode, or no steps."""
+    if num_envs < 1:
+        raise ValueError(f"num_envs: must be at least 1, got {num_envs}")
+    if render_mode is not None:
+        raise ValueError(f"render_mode: the batched environment has none, got {render_mode!r}")
+    if max_episode_steps is not None and max_episode_steps < 1:
+        raise ValueError(f"max_episode_steps: must be at least 1, got {max_episode_steps}")
 
 
 def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
