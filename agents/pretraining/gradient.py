@@ -48,7 +48,7 @@ class ModelEpisodes:
         matrices = np.concatenate([np.broadcast_to(np.eye(6), A.shape), A], axis=1) / unit[:, None]
         self._both, self._offset = _tensor(matrices.swapaxes(1, 2)), _tensor(np.concatenate([-r, b], axis=1) / unit)
         self._linear = _tensor(magnification * unit / np.tile(observation_layout(scenario).state_scale, 2))
-        self._price, self._scored = (
+        self._error_weight, self._scored = (
             _tensor(column(table, "error_weight")),
             _tensor(columns(table, "scored_position")),
         )
@@ -74,15 +74,14 @@ class ModelEpisodes:
         impulse = self._scenario.spacecraft.max_accel_m_s2 * self._scenario.dt_s
         misses = torch.stack(positions) - self._scored[1:, None]
         return impulse * _norm(torch.stack(actions), SMOOTH_THROTTLE).mean(dim=1).sum() + (
-            self._price[1:] @ self._judged(misses).mean(dim=1)
+            self._error_weight[1:] @ self._error_cost(misses).mean(dim=1)
         )
 
-    def _judged(self, misses: Tensor) -> Tensor:
-        """What the reward counts of position errors (..., 3), m."""
-        reward = self._scenario.reward
-        if reward.error_cost == "quadratic":
-            return (misses**2).sum(dim=-1) / reward.quadratic_scale_m
-        return _norm(misses, SMOOTH_M)
+    def _error_cost(self, misses: Tensor) -> Tensor:
+        """Cost (...) of position errors (..., 3), m, per unit of their weight, smooth at zero."""
+        cost = self._scenario.reward.cost()
+        total = cost.linear * _norm(misses, SMOOTH_M) if cost.linear else torch.zeros(misses.shape[:-1])
+        return total + cost.quadratic * (misses**2).sum(dim=-1) if cost.quadratic else total
 
     def _features(self, step: int, x_hat: Tensor, rest: Tensor) -> Tensor:
         """What the network reads (rows, SIZE), as the environment and `agents.policy.features` make it."""

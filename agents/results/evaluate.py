@@ -15,7 +15,7 @@ from agents.policy.library import load_policy
 from agents.policy.throttle import throttle
 from agents.training.run_folder import load_best
 from baselines import cost_ratio, fuel_optimal
-from baselines.controllers.registry import SOLVER
+from baselines.optimal.cone_solver import SOLVER
 from formation_env.dynamics import NONLINEAR
 from formation_env.evaluation.rollout import Policy, evaluate
 from formation_env.evaluation.seeds import seeds

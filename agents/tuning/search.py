@@ -17,7 +17,7 @@ from agents.hyperparameters import AgentSettings
 from agents.training.run_folder import Run, read_curve, start_file
 from agents.training.train import pretrained, train
 from agents.tuning.knobs import KNOBS, present, turned
-from baselines.tuning.gain_file import commented
+from baselines.tuning.settings_file import commented
 from baselines.tuning.study import distributions, open_study
 from formation_env.files import write_texts
 
