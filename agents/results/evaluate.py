@@ -122,7 +122,7 @@ def score(policy: Policy, scenario: Scenario, episodes: int, bound_episodes: int
         Index: metric, the last being `cost_over_bound` if it is known; columns: mean, low, high, seeds.
     """
     table = evaluate(policy, scenario, seeds("test", episodes))
-    summary = summarise(table).assign(seeds=episodes)
+    summary = summarise(table).rename(columns={"episodes": "seeds"})
     judged = seeds("test", episodes)[:bound_episodes]
     least = least_costs(scenario, judged, cache)
     if judged and least is not None:

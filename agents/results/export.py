@@ -124,13 +124,13 @@ def _saved(folder: Path, run: Run, episodes: pd.DataFrame) -> Interval | None:
 
 def _cost(episodes: pd.DataFrame) -> Interval:
     """Minus the return."""
-    mean, low, high = summarise(episodes).loc["return"]
+    mean, low, high = summarise(episodes).loc["return", ["mean", "low", "high"]]
     return Interval(mean=-mean, low=-high, high=-low)
 
 
 def _card(candidates: Sequence[Candidate], tensors: bytes) -> Card:
     best = candidates[0]
-    summary = summarise(best.episodes)
+    summary = summarise(best.episodes)[["mean", "low", "high"]]
     training = {key: value for key, value in asdict(best.run).items() if key not in ("algorithm", "env", "scenario")}
     return Card(
         algorithm=best.run.algorithm,
