@@ -134,7 +134,7 @@ def _cost(episodes: pd.DataFrame) -> Interval:
 
 def _card(candidates: Sequence[Candidate], tensors: bytes) -> Card:
     best = candidates[0]
-    rows = summarise(best.episodes)[["mean", "low", "high"]].iterrows()
+    summary = summarise(best.episodes)[["mean", "low", "high"]]
     training = {key: value for key, value in asdict(best.run).items() if key not in ("algorithm", "env", "scenario")}
     return Card(
         algorithm=best.run.algorithm,
