@@ -278,6 +278,7 @@ def foreign_model(folder: Path) -> Path:
 def test_faulty_sources_are_one_line(tmp_path: Path) -> None:
     """What is missing, damaged, of another algorithm or of another environment is named."""
     (tmp_path / "damaged.zip").write_text("no model")
+    (tmp_path / "model.onnx").write_text("no tensors")
     with zipfile.ZipFile(tmp_path / "other.zip", "w") as archive:
         archive.writestr("data", json.dumps({"exploration_fraction": 0.1}))
     for source, fault in (
