@@ -4,7 +4,9 @@ from dataclasses import asdict
 from typing import Final
 
 from agents.hyperparameters import SETTINGS, AgentSettings, Algorithm
-from baselines.tuning.knobs import Knob, read, turn
+from baselines.tuning.search_space import SearchDimension as Knob
+from baselines.tuning.search_space import apply as turn
+from baselines.tuning.search_space import current_values as read
 from formation_env.settings import build
 
 _EXPLORATION: Final = Knob(("log_std_init",), -5, -1, log=False)

@@ -17,8 +17,9 @@ from agents.hyperparameters import AgentSettings
 from agents.training.run_folder import Run, read_curve, start_file
 from agents.training.train import pretrained, train
 from agents.tuning.knobs import KNOBS, present, turned
-from baselines.tuning.gain_file import commented
-from baselines.tuning.study import distributions, open_study
+from baselines.tuning.journal import add_trial, open_study, trials_of
+from baselines.tuning.settings_file import commented
+from baselines.tuning.study import distributions
 from formation_env.files import write_texts
 
 if TYPE_CHECKING:
@@ -76,11 +77,11 @@ def search(run: Run, trials: int, folder: Path, tell: Callable[[Found], Any] = l
         ModuleNotFoundError: Optuna is not installed.
     """
     name = task_name(run)
-    study = open_study(name, folder / JOURNAL)
+    study = open_study({"algorithm": run.algorithm, "task": name}, folder / JOURNAL)
     run = _started(run, folder / name)
-    while len(known := study.get_trials(deepcopy=False)) < trials:
-        study.add_trial(_try(run, known))
-        found = best_of(run, study.get_trials(deepcopy=False))
+    while len(known := trials_of(study)) < trials:
+        add_trial(study, _try(run, known))
+        found = best_of(run, trials_of(study))
         write_texts(folder, {BEST: _to_yaml(run, found)})
         tell(found)
     return best_of(run, known[:trials])
@@ -159,5 +160,5 @@ def _to_yaml(run: Run, found: Found) -> str:
     """A file of hyperparameters, with a comment that says how they were found."""
     return commented(
         asdict(found.agent),
-        f"{run.command or 'python -m agents tune'}\n{run.env}, {run.steps} steps; {found.in_words()}",
+        f"{run.command or 'formation-env agents tune'}\n{run.env}, {run.steps} steps; {found.in_words()}",
     )

@@ -4,17 +4,17 @@ import itertools
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import gymnasium
 import pandas as pd
 
-from formation_env.task.loading import ENV_IDS
+from formation_env.registration import ENV_IDS
 
 RIVALS: Final = ("CartPole-v1", "Pendulum-v1")
-VARIANTS: Final = {"keeping_nonlinear": "FormationKeeping-v0"}
-"""Scenarios that are measured beside the ids' own, and the id that flies them."""
+MEASURED: Final = (*ENV_IDS, "keeping_nonlinear")
+"""Environments measured by default: the registered ids, and one with the nonlinear truth."""
 _ROUNDS: Final = 5
 _ACTIONS: Final = 64
 
@@ -23,10 +23,10 @@ def single_stepper(env_id: str, steps: int) -> Callable[[], int]:
     """A function that takes some steps in one environment made with `gymnasium.make`; it returns how many.
 
     Args:
-        env_id: an id, or one of `VARIANTS`.
+        env_id: a registered id of Gymnasium, or a scenario's name or YAML file.
         steps: how many each call takes.
     """
-    env: gymnasium.Env[Any, Any] = gymnasium.make(VARIANTS.get(env_id, env_id), **_scenario(env_id))
+    env: gymnasium.Env[Any, Any] = gymnasium.make(_registered(env_id), **_scenario(env_id))
     env.reset(seed=0)
     env.action_space.seed(0)
     actions = itertools.cycle([env.action_space.sample() for _ in range(_ACTIONS)])
@@ -43,8 +43,7 @@ def single_stepper(env_id: str, steps: int) -> Callable[[], int]:
 
 def batch_stepper(env_id: str, rows: int, steps: int) -> Callable[[], int]:
     """The same for the batched environment; a step of all rows counts as many."""
-    kind = VARIANTS.get(env_id, env_id)
-    env = gymnasium.make_vec(kind, rows, vectorization_mode="vector_entry_point", **_scenario(env_id))
+    env = gymnasium.make_vec(_registered(env_id), rows, vectorization_mode="vector_entry_point", **_scenario(env_id))
     env.reset(seed=0)
     env.action_space.seed(0)
     actions = itertools.cycle([env.action_space.sample() for _ in range(_ACTIONS)])
@@ -57,9 +56,14 @@ def batch_stepper(env_id: str, rows: int, steps: int) -> Callable[[], int]:
     return run
 
 
-def _scenario(env_id: str) -> dict[str, Any]:
-    """Arguments of a variant's environment."""
-    return {"scenario": env_id} if env_id in VARIANTS else {}
+def _registered(env: str) -> str:
+    """The id itself, or an id of ours that takes a scenario."""
+    return env if env in gymnasium.registry else next(iter(ENV_IDS))
+
+
+def _scenario(env: str) -> dict[str, Any]:
+    """Arguments of an environment that has no id of its own."""
+    return {} if env in gymnasium.registry else {"scenario": env}
 
 
 def rates(steppers: dict[str, Callable[[], int]], rounds: int = _ROUNDS) -> dict[str, float]:
@@ -85,18 +89,17 @@ def startup() -> dict[str, float]:
     return dict(zip(("import", "first single step", "first batched step"), map(float, output.split()), strict=True))
 
 
-def learning() -> int:
-    """Have `agents`, which nothing here imports, print how fast PPO learns; its exit status."""
-    return subprocess.call([sys.executable, "-m", "agents", "bench"])
-
-
-def table(rows: int) -> pd.DataFrame:
-    """Rates of all environments: columns steps_per_s and ratios to CartPole, for one environment and for a batch.
+def table(rows: int, envs: Sequence[str] = MEASURED) -> pd.DataFrame:
+    """Rates of environments: columns steps_per_s and ratios to CartPole, for one environment and for a batch.
 
     The actions are random, and the steps span whole episodes, so resets have their share.
+
+    Args:
+        rows: of the batch.
+        envs: registered ids, scenario names or YAML files; Gymnasium's own are measured with them.
     """
-    singles = rates({env_id: single_stepper(env_id, 3000) for env_id in (*ENV_IDS, *VARIANTS, *RIVALS)})
-    batches = rates({env_id: batch_stepper(env_id, rows, 400) for env_id in (*ENV_IDS, *VARIANTS, RIVALS[0])}, rounds=3)
+    singles = rates({env_id: single_stepper(env_id, 3000) for env_id in (*envs, *RIVALS)})
+    batches = rates({env_id: batch_stepper(env_id, rows, 400) for env_id in (*envs, RIVALS[0])}, rounds=3)
     lines = [
         {"faces": faces, "env": env_id, "steps_per_s": rate, "x_cartpole": rate / group[RIVALS[0]]}
         for faces, group in (("single", singles), (f"batch of {rows}", batches))

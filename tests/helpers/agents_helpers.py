@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 from typer.testing import CliRunner
 
-from agents.__main__ import MISTAKE, app
+from agents.cli import app
 from agents.policy.actor import Actor, Functions
 from agents.training.run_folder import Run
 from agents.training.run_settings import plan_run
 from formation_env import load_scenario
+from formation_env.cli_errors import WRONG_INPUT
 from formation_env.task.observation import SIZE
 
 SCENARIO = """
@@ -54,6 +55,6 @@ def random_actor(squash: str, activation: str = "tanh", power: float = 2.0, widt
 def assert_refused(arguments: list[str], fault: str) -> None:
     """The command says so in one line."""
     result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == MISTAKE
+    assert result.exit_code == WRONG_INPUT
     assert fault in result.stderr
     assert result.stderr.count("\n") == 1

@@ -12,15 +12,16 @@ from agents_helpers import PRETRAINED, SMALL, assert_refused, small_run
 from optuna.trial import FrozenTrial, TrialState
 from typer.testing import CliRunner
 
-from agents.__main__ import INTERRUPTED, app
+from agents.cli import app
 from agents.hyperparameters import ALGORITHMS, Algorithm, load_settings
 from agents.training.run_folder import CURVE, START, Run, read_curve
 from agents.training.train import train
 from agents.tuning import search as searching
 from agents.tuning.knobs import KNOBS, present, turned
 from agents.tuning.search import BEST, FEW, JOURNAL, search, task_name
-from baselines.tuning.study import open_study
+from baselines.tuning.journal import open_study
 from formation_env import ENV_IDS
+from formation_env.cli_errors import INTERRUPTED
 
 STEPS = (0, 100, 200)
 BOTTOM = 1e-4
@@ -161,7 +162,7 @@ def command(folder: Path, *options: str) -> list[str]:
     small_run(folder, "ppo")
     (folder / "agent.yaml").write_text(SMALL["ppo"])
     given = ("--steps", "128", "--validations", "1", "--validation-episodes", "4")
-    paths = ("--config", str(folder / "agent.yaml"), "--study", str(folder / "study"))
+    paths = ("--config", str(folder / "agent.yaml"), "--out", str(folder / "study"))
     return ["tune", "ppo", str(folder / "scenario.yaml"), *given, *paths, *options]
 
 
@@ -189,7 +190,7 @@ def test_mistakes_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     """A file that is no journal, an actor that is not there, and no Optuna."""
     (tmp_path / "study").mkdir()
     (tmp_path / "study" / JOURNAL).write_text("trials")
-    assert_refused(command(tmp_path), "trials.journal: is no journal of Optuna")
+    assert_refused(command(tmp_path), "trials.journal: no Optuna journal, or damaged")
     assert_refused(command(tmp_path, "--start", str(tmp_path / "none.safetensors")), "none.safetensors")
     monkeypatch.setitem(sys.modules, "optuna", None)
-    assert_refused(command(tmp_path), "pip install 'formation-env[rl,report,optimal]'")
+    assert_refused(command(tmp_path), "needs optuna; in a checkout: pip install -e '.[optimal]', or make")
