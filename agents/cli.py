@@ -20,11 +20,9 @@ NAME = "agents"
 PROGRAM = f"{DISTRIBUTION} {NAME}"
 
 Algorithm = Annotated[str, typer.Argument(help="ppo or sac.", show_default=False)]
-Config = Annotated[Path | None, typer.Option(help="YAML file of hyperparameters", show_default="configs/agents")]
-Steps = Annotated[int | None, typer.Option(min=1, help="Environment steps", show_default="as in the hyperparameters")]
-Rows = Annotated[
-    int | None, typer.Option(min=1, help="Parallel environments", show_default="as in the hyperparameters")
-]
+Config = Annotated[Path | None, typer.Option(help="YAML file of hyperparameters.", show_default="configs/agents")]
+Steps = Annotated[int | None, typer.Option(min=1, help="Environment steps.", show_default="from --config")]
+Rows = Annotated[int | None, typer.Option(min=1, help="Parallel environments.", show_default="from --config")]
 Start = Annotated[
     Path | None,
     typer.Option(help="Pretrained actor to start from: a .safetensors file, or a run's folder."),
@@ -60,7 +58,7 @@ def train(
     seed: Seed = 0,
     steps: Steps = None,
     out: Annotated[
-        Path | None, typer.Option(file_okay=False, help="Folder of the run", show_default="runs/ALGORITHM_ENV_seedN")
+        Path | None, typer.Option(file_okay=False, help="Folder of the run.", show_default="runs/ALGORITHM_ENV_seedN")
     ] = None,
     start: Start = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the run in --out with its own settings.")] = False,
@@ -71,17 +69,21 @@ def train(
     threads: Annotated[int, typer.Option(min=1, help="Threads of torch; more than 1 helps on idle machines only.")] = 1,
 ) -> None:
     """Train a policy and keep the best by validation cost. Ctrl-C saves and ends; --resume continues."""
+    from formation_env.settings import ConfigError
+
+    if resume and out is None:
+        folder = algorithm if algorithm and Path(algorithm).exists() else "FOLDER"
+        raise ConfigError(f"train --resume: now a flag, {PROGRAM} train --out {shlex.quote(folder)} --resume")
+    if not resume and (algorithm is None or env is None):
+        raise ConfigError("train: give an algorithm and an environment, or --out FOLDER --resume")
     from agents.training.run_settings import default_folder, plan_run
     from agents.training.train import resume as resume_run
     from agents.training.train import train as train_run
-    from formation_env.settings import ConfigError
 
     if resume:
-        folder = _resumed_folder(context, out, algorithm)
-        _report_outcome(resume_run(folder, 60 * time_limit), folder)
+        _check_resumed(context, out)
+        _report_outcome(resume_run(out, 60 * time_limit), out)
         return
-    if algorithm is None or env is None:
-        raise ConfigError("train: give an algorithm and an environment, or --out FOLDER --resume")
     run = plan_run(
         algorithm=algorithm,
         env=env,
@@ -113,26 +115,22 @@ def _existing(start: Path | None) -> Path | None:
     return start
 
 
-def _resumed_folder(context: typer.Context, out: Path | None, algorithm: str | None) -> Path:
-    """The folder to resume; arguments that would make it another run are refused.
+def _check_resumed(context: typer.Context, folder: Path) -> None:
+    """Refuse arguments that would make a resumed run another run.
 
     Raises:
-        ConfigError: no folder is given, no run is there, or an argument differs from the run's.
+        ConfigError: no run is there, or an argument differs from the run's.
     """
     from agents.training.run_folder import load_run
     from formation_env.settings import ConfigError
 
-    if out is None:
-        folder = algorithm if algorithm and Path(algorithm).exists() else "FOLDER"
-        raise ConfigError(f"train --resume: now a flag, {PROGRAM} train --out {shlex.quote(folder)} --resume")
-    run = load_run(out)
+    run = load_run(folder)
     for name, value in context.params.items():
         source = context.get_parameter_source(name)
         if name in ("resume", "time_limit", "out") or source is None or source.name == "DEFAULT":
             continue
         if name not in ("algorithm", "env") or value != getattr(run, name):
-            raise ConfigError(f"--resume: {out} continues as it began: {run.algorithm} {run.env}; leave out {name}")
-    return out
+            raise ConfigError(f"--resume: {folder} continues as it began: {run.algorithm} {run.env}; leave out {name}")
 
 
 def _report_outcome(outcome: str, folder: Path) -> None:
@@ -154,9 +152,7 @@ def tune(
     config: Config = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            file_okay=False, help="Folder of the study; an existing study continues", show_default="runs/tuning"
-        ),
+        typer.Option(file_okay=False, help="Folder of the study; a present one continues.", show_default="runs/tuning"),
     ] = None,
     start: Start = None,
     seed: Seed = 0,

@@ -18,7 +18,7 @@ EXAMPLE = f"{DISTRIBUTION} baselines tune mine.yaml --policy smc --trials 20 --e
 
 Policies = Annotated[
     list[str] | None,
-    typer.Option("--policy", help="Name of a policy; may be repeated", show_default="all tunable ones"),
+    typer.Option("--policy", help="Name of a policy; may be repeated.", show_default="all tunable"),
 ]
 Trials = Annotated[int, typer.Option(min=1, help="Trials of each policy in each scenario.")]
 Episodes = Annotated[int, typer.Option(min=2, max=MAX_EPISODES, help="Tuning episodes of each trial.")]

@@ -54,6 +54,8 @@ def one_line_errors() -> Iterator[None]:
     except KeyboardInterrupt as error:
         _end(str(error) or "interrupted, nothing written", INTERRUPTED)
     except ModuleNotFoundError as error:
+        if str(error.name).partition(".")[0] in PACKAGES:
+            raise
         _end(f"error: {missing_library(error)}", WRONG_INPUT)
     except BrokenExecutor:
         _end("error: a worker process died (killed, or out of memory); run again with fewer --processes", FAILED)

@@ -80,7 +80,9 @@ class RootGroup(Group):
         if own is not None or cmd_name not in (offered := _offered()):
             return own
         check_owner(_package(offered[cmd_name]))
-        return typer.main.get_group(offered[cmd_name].load())
+        group = typer.main.get_group(offered[cmd_name].load())
+        group.name = cmd_name
+        return group
 
 
 def _offered() -> dict[str, importlib.metadata.EntryPoint]:

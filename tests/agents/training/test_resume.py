@@ -158,13 +158,13 @@ def test_what_cannot_be_resumed_is_one_line(tmp_path: Path) -> None:
     """No run, a damaged checkpoint, or nothing said at all."""
     assert_refused(["train"], "train: give an algorithm and an environment, or --out FOLDER --resume")
     assert_refused(
-        ["train", "--out", str(tmp_path / "none"), "--resume"], "settings.json: cannot be read: No such file"
+        ["train", "--resume", "--out", str(tmp_path / "none")], "settings.json: cannot be read: No such file"
     )
     start_run(small_run(tmp_path, "ppo"), tmp_path / "run")
     for content in (b"", b"no checkpoint"):
         (tmp_path / "run" / CHECKPOINT).write_bytes(content)
         assert_refused(
-            ["train", "--out", str(tmp_path / "run"), "--resume"], f"{CHECKPOINT}: damaged, or no checkpoint"
+            ["train", "--resume", "--out", str(tmp_path / "run")], f"{CHECKPOINT}: damaged, or no checkpoint"
         )
 
 

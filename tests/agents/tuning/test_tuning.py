@@ -30,7 +30,7 @@ BOTTOM = 1e-4
 
 def kept(run: Run, folder: Path) -> list[FrozenTrial]:
     """The trials in a study's journal."""
-    return open_study(task_name(run), folder / JOURNAL).get_trials()
+    return open_study({"algorithm": run.algorithm, "task": task_name(run)}, folder / JOURNAL).get_trials()
 
 
 def numbers(trials: Sequence[FrozenTrial]) -> list[list[Any]]:
@@ -178,7 +178,7 @@ def test_the_command_tells_and_goes_on_after_an_interrupt(tmp_path: Path, monkey
     monkeypatch.setattr(searching, "train", interrupted)
     result = CliRunner().invoke(app, command(tmp_path, "--trials", "3"))
     assert result.exit_code == INTERRUPTED
-    assert "interrupted; finished trials are kept in" in result.stderr
+    assert "interrupted; finished trials are saved in" in result.stderr
     assert "best of 1 trials: " in result.stdout
     result = CliRunner().invoke(app, command(tmp_path, "--trials", "3"))
     assert result.exit_code == 0, result.output

@@ -1,5 +1,6 @@
 """The search of gains: it never gets worse, it can be stopped and gone on with, and it says how it was made."""
 
+import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from typer.testing import CliRunner
 
 from baselines.cli import app
 from baselines.cli_tune import make_task as task
+from baselines.cli_tune import settings_file
 from baselines.controllers.registry import POLICIES, make_policy, read_gains
 from baselines.experiments.policy_batch import SideBySide
 from baselines.tuning import study
@@ -31,6 +33,7 @@ from formation_env.evaluation.rollout import evaluate
 from formation_env.evaluation.seeds import seeds
 from formation_env.numerics.arrays import Array
 from formation_env.settings import ConfigError, build, load_yaml
+from formation_env.task.loading import config_folder
 
 BOTTOM = {"reweighted_lqg.floor": 7e-4, "reweighted_lqg.error_weight_scale": 0.6, "deadband": 0.3}
 """Where the bowl has its least value, 0."""
@@ -287,3 +290,74 @@ def test_gains_in_use_are_tried_too(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     path.write_text("lqr: {deadband: 0.3, reweighted_lqg: {floor: 1e-9, error_weight_scale: 0.6}}\n")
     assert values_in_use("lqr", path, SEARCH_SPACES["lqr"]) == {**BOTTOM, "reweighted_lqg.floor": 1e-5}
     assert values_in_use("lqr", tmp_path / "none.yaml", SEARCH_SPACES["lqr"]) is None
+
+
+def test_a_damaged_journal_is_refused_or_harmless(lqr: TuningTask, tmp_path: Path) -> None:
+    """One byte flipped anywhere: an error that names the file, or the trials are those that were written.
+
+    The date of a trial and the name of a process carry no result; all else does. A trial that is lost at the end is
+    flown again.
+    """
+    search(lqr, 10, tmp_path / "whole")
+    written, text = numbers(kept(lqr, tmp_path / "whole")), (tmp_path / "whole").read_bytes()
+    rng, refused = np.random.default_rng(0), 0
+    positions = rng.choice(len(text), 120, replace=False)
+    for position in positions:
+        damaged = bytearray(text)
+        damaged[position] ^= 1 << int(rng.integers(7))
+        path = tmp_path / f"damaged{position}"
+        path.write_bytes(damaged)
+        try:
+            read = numbers(kept(lqr, path))
+        except ConfigError as error:
+            refused += 1
+            assert str(error).startswith(f"{path}: no Optuna journal, or damaged")
+        else:
+            assert read == written[: len(read)], damaged[max(0, position - 40) : position + 40]
+    assert refused > 60
+
+
+def test_an_edited_cost_is_refused(lqr: TuningTask, tmp_path: Path) -> None:
+    """Valid JSON with another number in it, which Optuna takes as it is."""
+    result = search(lqr, 3, tmp_path / "j")
+    text = (tmp_path / "j").read_text()
+    assert repr(result.cost) in text
+    (tmp_path / "j").write_text(text.replace(repr(result.cost), repr(result.cost / 2)))
+    with pytest.raises(ConfigError, match="j: no Optuna journal, or damaged"):
+        search(lqr, 3, tmp_path / "j")
+
+
+def test_a_study_under_another_name_is_refused(lqr: TuningTask, tmp_path: Path) -> None:
+    """The identity in the journal is that of its name: policy, scenario, seeds, settings and search space."""
+    search(lqr, 2, tmp_path / "j")
+    text = (tmp_path / "j").read_text()
+    assert '"first_seed": 2000000' in text or '"first_seed":2000000' in text
+    (tmp_path / "j").write_text(re.sub(r'("first_seed": ?)2000000', r"\g<1>2000001", text))
+    with pytest.raises(ConfigError, match="j: no Optuna journal, or damaged"):
+        search(lqr, 2, tmp_path / "j")
+
+
+def test_settings_of_a_users_scenario_stand_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`tune mine.yaml` writes mine.baselines.yaml, and nothing in the package or in configs/."""
+    monkeypatch.setattr(TuningTask, "costs", bowl)
+    scenario = tmp_path / "mine.yaml"
+    scenario.write_text("phases: [{formation: {kind: following, y0_m: -100}, hold_orbits: 0.1}]\n")
+    folder = config_folder("baselines")
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    result = tune(scenario, "--policy", "lqr", "--trials", 3, "--studies", tmp_path / "studies")
+    assert result.exit_code == 0, result.output
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["mine.baselines.yaml", "mine.yaml", "studies"]
+    assert "lqr" in load_yaml(tmp_path / "mine.baselines.yaml")
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_an_installed_package_is_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Settings of shipped scenarios change in a checkout only; elsewhere --out must say where they go."""
+    assert settings_file("keeping", None) == config_folder("baselines") / "keeping.yaml"
+    assert settings_file("FormationKeeping-v0", None) == config_folder("baselines") / "keeping.yaml"
+    monkeypatch.setattr("baselines.cli_tune.is_checkout", lambda: False)
+    result = tune("keeping", "--policy", "lqr", "--studies", tmp_path)
+    assert result.exit_code == 2
+    assert result.stderr == "error: tune: keeping: its settings belong to the installed package; give --out FOLDER\n"
+    assert settings_file("keeping", tmp_path) == tmp_path / "keeping.yaml"
+    assert settings_file("mine.yaml", tmp_path) == tmp_path / "mine.yaml"
