@@ -112,6 +112,9 @@ def check_owner(package: str) -> None:
 
     if _is_ours(package):
         return
+    ours = Path(__file__).parents[1] / package / "__init__.py"
+    if ours.parent.is_dir() and not ours.exists():
+        raise ConfigError(f"{ours}: missing, perhaps removed with another package; install {DISTRIBUTION} again")
     claims = importlib.metadata.packages_distributions().get(package, [])
     others = sorted({name for name in claims if name != DISTRIBUTION}) or ["another package"]
     raise ConfigError(
