@@ -71,19 +71,17 @@ def train(
     """Train a policy and keep the best by validation cost. Ctrl-C saves and ends; --resume continues."""
     from formation_env.settings import ConfigError
 
-    if resume and out is None:
-        folder = algorithm if algorithm and Path(algorithm).exists() else "FOLDER"
-        raise ConfigError(f"train --resume: now a flag, {PROGRAM} train --out {shlex.quote(folder)} --resume")
-    if not resume and (algorithm is None or env is None):
+    if resume:
+        if out is None:
+            named = algorithm if algorithm and Path(algorithm).exists() else "FOLDER"
+            raise ConfigError(f"train --resume: now a flag, {PROGRAM} train --out {shlex.quote(named)} --resume")
+        _resume(context, out, 60 * time_limit)
+        return
+    if algorithm is None or env is None:
         raise ConfigError("train: give an algorithm and an environment, or --out FOLDER --resume")
     from agents.training.run_settings import default_folder, plan_run
-    from agents.training.train import resume as resume_run
     from agents.training.train import train as train_run
 
-    if resume:
-        _check_resumed(context, out)
-        _report_outcome(resume_run(out, 60 * time_limit), out)
-        return
     run = plan_run(
         algorithm=algorithm,
         env=env,
@@ -115,13 +113,14 @@ def _existing(start: Path | None) -> Path | None:
     return start
 
 
-def _check_resumed(context: typer.Context, folder: Path) -> None:
-    """Refuse arguments that would make a resumed run another run.
+def _resume(context: typer.Context, folder: Path, time_limit_s: float) -> None:
+    """Continue a run; arguments that would make it another run are refused.
 
     Raises:
         ConfigError: no run is there, or an argument differs from the run's.
     """
     from agents.training.run_folder import load_run
+    from agents.training.train import resume
     from formation_env.settings import ConfigError
 
     run = load_run(folder)
@@ -131,6 +130,7 @@ def _check_resumed(context: typer.Context, folder: Path) -> None:
             continue
         if name not in ("algorithm", "env") or value != getattr(run, name):
             raise ConfigError(f"--resume: {folder} continues as it began: {run.algorithm} {run.env}; leave out {name}")
+    _report_outcome(resume(folder, time_limit_s), folder)
 
 
 def _report_outcome(outcome: str, folder: Path) -> None:
