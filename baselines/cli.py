@@ -47,8 +47,8 @@ def report(arguments: ReportArguments) -> None:
         from baselines.report import write_report
         from formation_env.task.loading import ENV_IDS
 
-        policies, envs = classical(arguments.policy or ()), arguments.envs or list(ENV_IDS)
-        command = command_line(NAME)
+        envs = arguments.envs or list(ENV_IDS)
+        policies, command = classical(arguments.policy or (), envs), command_line(NAME)
         return write_report(policies, envs, arguments.options(), arguments.out, command, arguments.processes)
 
     write_report_page(arguments.out, arguments.resume, write)
@@ -76,14 +76,16 @@ def sweep(
     """Plot the delta-v against error trade-off, and cost under perturbed conditions."""
 
     def write() -> Path:
-        from baselines.controllers.registry import FLOORS, SLOW
+        from baselines.controllers.registry import reference_policies, slow_policies
         from baselines.experiments.policy_factories import classical
         from baselines.report.write_sweep import Wanted, write_sweep
         from formation_env.task.loading import ENV_IDS
 
-        names = policy or [name for name in classical() if name not in (*SLOW, *FLOORS)]
+        flown = envs or list(ENV_IDS)
+        left_out = (*slow_policies(), *reference_policies())
+        names = policy or [name for name in classical() if name not in left_out]
         options = Wanted(episodes=episodes, bound_episodes=bound_episodes, resume=resume)
-        return write_sweep(classical(names), envs or list(ENV_IDS), options, out, command_line(NAME), processes)
+        return write_sweep(classical(names, flown), flown, options, out, command_line(NAME), processes)
 
     write_report_page(out, resume, write)
 

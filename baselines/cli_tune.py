@@ -104,6 +104,7 @@ def settings_file(name: str, out: Path | None) -> Path:
     Raises:
         ConfigError: a shipped scenario of an installed package, and no folder is given.
     """
+    from baselines.controllers.registry import settings_beside
     from formation_env.settings import ConfigError
     from formation_env.task.loading import ENV_IDS, config_folder
 
@@ -111,11 +112,11 @@ def settings_file(name: str, out: Path | None) -> Path:
     is_file = path.suffix in (".yaml", ".yml")
     if out is not None:
         return out / f"{path.stem if is_file else shipped}.yaml"
-    if is_file:
-        return path.with_name(f"{path.stem}.baselines.yaml")
+    if (beside := settings_beside(name)) is not None:
+        return beside
     if not is_checkout():
         raise ConfigError(f"tune: {name}: its settings belong to the installed package; give --out FOLDER")
-    return config_folder("baselines") / f"{shipped}.yaml"
+    return config_folder("baselines") / f"{path.stem if is_file else shipped}.yaml"
 
 
 def make_task(policy: str, env: str, episodes: int) -> "TuningTask":
@@ -138,7 +139,7 @@ def make_task(policy: str, env: str, episodes: int) -> "TuningTask":
         scenario=scenario,
         episode_seeds=seeds("tuning", episodes),
         settings=default_settings(policy),
-        dimensions=search_space(policy, scenario),
+        parameters=search_space(policy, scenario),
     )
 
 
@@ -149,7 +150,7 @@ def _tune_one(task: "TuningTask", name: str, budget: Budget, path: Path, studies
     from baselines.tuning.study import search
 
     trials, policy = budget.of(task.policy)[0], task.policy
-    in_use = values_in_use(policy, path, task.dimensions)
+    in_use = values_in_use(policy, path, task.parameters)
     journal = studies / f"{Path(name).stem}_{policy}.journal"
     with typer.progressbar(length=trials, label=f"{name} {policy}") as bar:
         result = search(task, trials, journal, bar.update, in_use)
@@ -165,6 +166,6 @@ def _range(seeds: Sequence[int]) -> str:
 
 
 def _is_slow(policy: str) -> bool:
-    from baselines.controllers.registry import SLOW
+    from baselines.controllers.registry import slow_policies
 
-    return policy in SLOW
+    return policy in slow_policies()

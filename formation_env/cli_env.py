@@ -195,7 +195,7 @@ def bench(
     from formation_env.evaluation import bench as benchmark
     from formation_env.task.loading import load_scenario
 
-    chosen: Sequence[str] = envs or benchmark.MEASURED
+    chosen: Sequence[str] = envs or benchmark.DEFAULT
     for env in chosen:
         load_scenario(env)
     for name, seconds in benchmark.startup().items():

@@ -1,136 +1,67 @@
-"""Search spaces of the policies' settings; a tunable policy has one here, and a section in default.yaml."""
+"""Search spaces applied to settings; each policy class states its own, and default.yaml has its section."""
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from baselines.controllers.registry import read_gains
+from baselines.controllers.registry import POLICIES, read_settings
+from baselines.controllers.search_space import Parameter
 from formation_env.settings import load_yaml
 from formation_env.task.loading import config_folder
 from formation_env.task.scenario import Scenario
 
-
-@dataclass(frozen=True)
-class SearchDimension:
-    """One dimension of a search space: settings that share a value.
-
-    Attributes:
-        keys: dotted paths of the settings; a number is an axis. The first one names the dimension.
-        low: lower limit, in the setting's unit.
-        high: upper limit.
-        log: whether the logarithm is sampled evenly, else the value.
-        transfer: whether the dimension affects transfers only.
-    """
-
-    keys: tuple[str, ...]
-    low: float
-    high: float
-    log: bool = True
-    transfer: bool = False
-
-    @property
-    def name(self) -> str:
-        """Name of the parameter in a study."""
-        return self.keys[0]
-
-
-def _regulator(section: str, transfer: bool) -> tuple[SearchDimension, ...]:
-    """Weights of a regulator: along-track and cross-track position weights stay 1, since only ratios matter."""
-    return (
-        SearchDimension((f"{section}.position.0",), 1e-2, 1e2, transfer=transfer),
-        SearchDimension((f"{section}.velocity_s2.0", f"{section}.velocity_s2.1"), 1e2, 1e8, transfer=transfer),
-        SearchDimension((f"{section}.velocity_s2.2",), 1e2, 1e8, transfer=transfer),
-        SearchDimension((f"{section}.control_s2.0", f"{section}.control_s2.1"), 1, 1e8, transfer=transfer),
-        SearchDimension((f"{section}.control_s2.2",), 1, 1e8, transfer=transfer),
-    )
-
-
-_CORRECTION: Final = (
-    SearchDimension(("correction.miss_m",), 0.3, 300, transfer=True),
-    SearchDimension(("correction.miss_sigmas",), 0.2, 10, transfer=True),
-)
-_KEEPING: Final = (
-    SearchDimension(("keeping.band_m",), 0.5, 200),
-    SearchDimension(("keeping.look_ahead_orbits",), 0.05, 2),
-    SearchDimension(("keeping.least_reduction",), 0, 0.95, log=False),
-)
-
-SEARCH_SPACES: Final[dict[str, tuple[SearchDimension, ...]]] = {
-    "lqr": (
-        SearchDimension(("reweighted_lqg.floor",), 1e-5, 1e-2),
-        SearchDimension(("reweighted_lqg.error_weight_scale",), 0.3, 3),
-        SearchDimension(("deadband",), 0, 1, log=False),
-    ),
-    "lqr_nominal": (
-        SearchDimension(("reweighted_lqg.floor",), 1e-5, 1e-2),
-        SearchDimension(("reweighted_lqg.error_weight_scale",), 0.3, 3),
-    ),
-    "lqr_finite": (*_regulator("transfer", transfer=True), *_regulator("hold", transfer=False)),
-    "lqr_quasi_static": (*_regulator("transfer", transfer=True), *_regulator("hold", transfer=False)),
-    "smc": (
-        *(SearchDimension((f"surface.decay_per_s.{axis}",), 3e-5, 3e-2) for axis in range(3)),
-        SearchDimension(("reaching.eps_m_s",), 1e-4, 1),
-        SearchDimension(("reaching.q_per_s",), 3e-5, 3e-2),
-        SearchDimension(("boundary_m",), 0.1, 1e4),
-    ),
-    "two_impulse": (*_CORRECTION, SearchDimension(("braking",), 0, 1.5, log=False, transfer=True), *_KEEPING),
-    "deadband": (SearchDimension(("least_thrust",), 1e-3, 0.5, transfer=True), *_CORRECTION, *_KEEPING),
-    "mpc": (
-        SearchDimension(("error_weight_scale",), 0.3, 3),
-        SearchDimension(("error_scatter",), 0, 3, log=False),
-        SearchDimension(("thrust_scatter",), 0, 2, log=False),
-    ),
+SEARCH_SPACES: Final[dict[str, tuple[Parameter, ...]]] = {
+    name: policy.search_space
+    for name, policy in sorted(POLICIES.items(), key=lambda each: each[1].slow)
+    if policy.search_space
 }
-"""Policy -> its search space; the slowest comes last."""
+"""Policy -> its search space; slow policies come last."""
 
 
-def search_space(policy: str, scenario: Scenario) -> tuple[SearchDimension, ...]:
-    """The dimensions of a policy's search space that affect a scenario."""
+def search_space(policy: str, scenario: Scenario) -> tuple[Parameter, ...]:
+    """The parameters of a policy's search space that affect a scenario."""
     transfers = any(scenario.steps(phase.transfer_orbits) for phase in scenario.phases)
-    return tuple(dimension for dimension in SEARCH_SPACES[policy] if transfers or not dimension.transfer)
+    return tuple(parameter for parameter in SEARCH_SPACES[policy] if transfers or not parameter.transfer)
 
 
 def default_settings(policy: str) -> dict[str, Any]:
-    """The policy's section of default.yaml, where a search starts; it has every dimension's keys."""
+    """The policy's section of default.yaml, where a search starts; it has every parameter's keys."""
     path = config_folder("baselines") / "default.yaml"
-    read_gains(policy, path)  # refuses what is wrong in it
+    read_settings(policy, path)  # refuses what is wrong in it
     section: dict[str, Any] = load_yaml(path)[policy]
     return section
 
 
-def values_in_use(policy: str, path: Path, dimensions: Sequence[SearchDimension]) -> dict[str, float] | None:
-    """Values of the dimensions in a settings file, clipped to their limits; None if the file does not give them all.
+def values_in_use(policy: str, path: Path, parameters: Sequence[Parameter]) -> dict[str, float] | None:
+    """Values of the parameters in a settings file, clipped to their limits; None if the file does not give them all.
 
     Raises:
         ConfigError: the file is faulty.
     """
     if not path.is_file():
         return None
-    read_gains(policy, path)
+    read_settings(policy, path)
     try:
-        values = current_values(load_yaml(path).get(policy, {}), dimensions)
+        values = current_values(load_yaml(path).get(policy, {}), parameters)
     except (KeyError, IndexError, TypeError):
         return None
-    return {each.name: min(max(values[each.name], each.low), each.high) for each in dimensions}
+    return {each.name: min(max(values[each.name], each.low), each.high) for each in parameters}
 
 
-def apply(
-    settings: dict[str, Any], dimensions: Sequence[SearchDimension], values: Mapping[str, float]
-) -> dict[str, Any]:
-    """Settings with the dimensions at values, by the dimensions' names, rounded to three digits."""
+def apply(settings: dict[str, Any], parameters: Sequence[Parameter], values: Mapping[str, float]) -> dict[str, Any]:
+    """Settings with the parameters at values, by the parameters' names, rounded to three digits."""
     changed = copy.deepcopy(settings)
-    for dimension in dimensions:
-        for key in dimension.keys:
+    for parameter in parameters:
+        for key in parameter.keys:
             parent, last = _parent(changed, key)
-            parent[last] = float(f"{values[dimension.name]:.3g}")
+            parent[last] = float(f"{values[parameter.name]:.3g}")
     return changed
 
 
-def current_values(settings: dict[str, Any], dimensions: Sequence[SearchDimension]) -> dict[str, float]:
-    """Values of the dimensions in settings, by name."""
-    places = {dimension.name: _parent(settings, dimension.name) for dimension in dimensions}
+def current_values(settings: dict[str, Any], parameters: Sequence[Parameter]) -> dict[str, float]:
+    """Values of the parameters in settings, by name."""
+    places = {parameter.name: _parent(settings, parameter.name) for parameter in parameters}
     return {name: float(parent[last]) for name, (parent, last) in places.items()}
 
 

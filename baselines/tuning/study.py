@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from baselines.controllers.registry import make_policy
+from baselines.controllers.search_space import Parameter
 from baselines.experiments.policy_batch import SideBySide
 from baselines.tuning.journal import add_trial, digest, open_study, trials_of
-from baselines.tuning.search_space import SearchDimension, apply, current_values
+from baselines.tuning.search_space import apply, current_values
 from formation_env.evaluation.rollout import MAX_ROWS, Policy, evaluate
 from formation_env.numerics.arrays import Array
 from formation_env.task.scenario import Scenario
@@ -36,14 +37,14 @@ class TuningTask:
         scenario: the scenario that it flies.
         episode_seeds: one seed per episode, the same for all candidates.
         settings: where the search starts; settings outside the search space stay.
-        dimensions: the search space.
+        parameters: the search space.
     """
 
     policy: str
     scenario: Scenario
     episode_seeds: range
     settings: dict[str, Any]
-    dimensions: tuple[SearchDimension, ...]
+    parameters: tuple[Parameter, ...]
 
     @property
     def identity(self) -> dict[str, str | int]:
@@ -54,12 +55,12 @@ class TuningTask:
             "first_seed": self.episode_seeds[0],
             "episodes": len(self.episode_seeds),
             "settings_sha256": digest(self.settings),
-            "search_space_sha256": digest(repr(self.dimensions)),
+            "search_space_sha256": digest(repr(self.parameters)),
         }
 
     def costs(self, candidates: Sequence[Mapping[str, float]]) -> Array:
-        """Mean costs (candidates,), m/s, with the dimensions at the candidates' values."""
-        settings = [apply(self.settings, self.dimensions, candidate) for candidate in candidates]
+        """Mean costs (candidates,), m/s, with the parameters at the candidates' values."""
+        settings = [apply(self.settings, self.parameters, candidate) for candidate in candidates]
         policies = [make_policy(self.policy, self.scenario, each) for each in settings]
         return costs(policies, self.scenario, self.episode_seeds)
 
@@ -105,7 +106,7 @@ def search(
         trials: number of trials; trial 0 has the task's own settings.
         journal: file of the study; made if it does not exist, and extended after each batch.
         progress: called with the number of newly known trials.
-        in_use: values of the dimensions in the settings used so far; a new study has them as trial 1.
+        in_use: values of the parameters in the settings used so far; a new study has them as trial 1.
 
     Raises:
         ConfigError: the file is no journal, or damaged.
@@ -118,12 +119,12 @@ def search(
     while len(known) < trials:
         first = len(known) // BATCH * BATCH
         batch = candidates(task, known[:first], in_use)[len(known) - first : trials - first]
-        add(study, task.dimensions, batch, task.costs(batch))
+        add(study, task.parameters, batch, task.costs(batch))
         known = trials_of(study)[:trials]
         progress(len(batch))
     values = [float(trial.values[0]) for trial in known]
     best = known[int(np.argmin(values))]
-    settings = apply(task.settings, task.dimensions, best.params)
+    settings = apply(task.settings, task.parameters, best.params)
     return SearchResult(settings=settings, cost=min(values), first_cost=values[0], trial=best.number)
 
 
@@ -138,24 +139,22 @@ def candidates(
     study = create_study(sampler=TPESampler(seed=len(before), multivariate=True, constant_liar=True))
     study.add_trials(before)
     if not before:
-        for known in filter(None, (current_values(task.settings, task.dimensions), in_use)):
+        for known in filter(None, (current_values(task.settings, task.parameters), in_use)):
             study.enqueue_trial(known, skip_if_exists=True)
-    return [study.ask(distributions(task.dimensions)).params for _ in range(BATCH)]
+    return [study.ask(distributions(task.parameters)).params for _ in range(BATCH)]
 
 
-def add(
-    study: "Study", dimensions: Sequence[SearchDimension], batch: Sequence[dict[str, float]], values: Array
-) -> None:
+def add(study: "Study", parameters: Sequence[Parameter], batch: Sequence[dict[str, float]], values: Array) -> None:
     """Append a batch's candidates with their costs to the journal."""
     from optuna.trial import create_trial
 
-    limits = distributions(dimensions)
+    limits = distributions(parameters)
     for params, value in zip(batch, values, strict=True):
         add_trial(study, create_trial(params=params, distributions=limits, value=float(value)))
 
 
-def distributions(dimensions: Sequence[SearchDimension]) -> dict[str, Any]:
+def distributions(parameters: Sequence[Parameter]) -> dict[str, Any]:
     """The search space as Optuna's distributions."""
     from optuna.distributions import FloatDistribution
 
-    return {each.name: FloatDistribution(each.low, each.high, log=each.log) for each in dimensions}
+    return {each.name: FloatDistribution(each.low, each.high, log=each.log) for each in parameters}

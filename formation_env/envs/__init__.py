@@ -1,4 +1,4 @@
-"""The environments: two faces of one simulation."""
+"""The single and the batched environment, both faces of one simulation."""
 
 from formation_env.envs.single import FormationEnv
 from formation_env.envs.vector import FormationVectorEnv

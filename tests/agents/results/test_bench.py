@@ -1,6 +1,6 @@
 """The measurement of PPO's speed."""
 
-from agents.hyperparameters import PPOSettings
+from agents.algorithms.ppo import PPOSettings
 from agents.results.bench import measure
 
 

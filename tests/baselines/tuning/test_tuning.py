@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from baselines.cli import app
 from baselines.cli_tune import make_task as task
 from baselines.cli_tune import settings_file
-from baselines.controllers.registry import POLICIES, make_policy, read_gains
+from baselines.controllers.registry import POLICIES, make_policy, read_settings
 from baselines.experiments.policy_batch import SideBySide
 from baselines.tuning import study
 from baselines.tuning.journal import open_study
@@ -41,7 +41,7 @@ BOTTOM = {"reweighted_lqg.floor": 7e-4, "reweighted_lqg.error_weight_scale": 0.6
 
 def bowl(self: TuningTask, batch: list[dict[str, float]]) -> Array:
     """Squared distances from the bottom, in decades, or as they are: a cost in closed form for `lqr`."""
-    log = {knob.name: knob.log for knob in self.dimensions}
+    log = {knob.name: knob.log for knob in self.parameters}
     off = [[np.log10(each[k] / at) if log[k] else each[k] - at for k, at in BOTTOM.items()] for each in batch]
     return (np.array(off) ** 2).sum(axis=1)
 
@@ -114,10 +114,10 @@ def test_search_finds_the_bottom(lqr: TuningTask, tmp_path: Path) -> None:
     """
     found = search(lqr, 150, tmp_path / "j")
     assert found.cost < (-np.log(0.95) * 3 / 150 / (4 / 3 * np.pi)) ** (2 / 3)
-    (reached,) = bowl(lqr, [current_values(found.settings, lqr.dimensions)])
+    (reached,) = bowl(lqr, [current_values(found.settings, lqr.parameters)])
     # the gains are those of the best trial, to three digits: half a percent is 0.002 decades
     assert abs(np.sqrt(reached) - np.sqrt(found.cost)) < 0.004
-    assert found.first_cost == pytest.approx(bowl(lqr, [current_values(lqr.settings, lqr.dimensions)])[0], rel=1e-12)
+    assert found.first_cost == pytest.approx(bowl(lqr, [current_values(lqr.settings, lqr.parameters)])[0], rel=1e-12)
 
 
 @pytest.mark.parametrize("stop", [1, 5, 8, 13])
@@ -167,7 +167,7 @@ def test_command_writes_gains_that_load_and_are_no_worse(tmp_path: Path) -> None
     assert path.name == "keeping.yaml"
     assert "formation-env baselines tune keeping --policy smc --trials 10 --episodes 4\n" in path.read_text()
     scenario = load_scenario("keeping")
-    default = read_gains("smc", Path(__file__).parents[3] / "configs" / "baselines" / "default.yaml")
+    default = read_settings("smc", Path(__file__).parents[3] / "configs" / "baselines" / "default.yaml")
     both = [make_policy("smc", scenario, gains) for gains in (default, path)]
     before, after = costs(both, scenario, range(2_000_000, 2_000_004))
     assert after <= before
