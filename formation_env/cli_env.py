@@ -1,6 +1,7 @@
 """The commands of `formation-env env`. What they need is imported when they run."""
 
 import importlib.metadata
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Final
@@ -76,19 +77,15 @@ def _plain(value: object) -> object:
 
 @app.command(epilog=f"Example: {DISTRIBUTION} env kinds")
 def kinds() -> None:
-    """List the kinds of formation, dropout and sensor with their keys and defaults."""
+    """List the kinds of formation, dropout and dynamics with their keys: type, default and meaning."""
     from formation_env.task.loading import kinds as kinds_of
 
-    for section, members in kinds_of().items():
-        typer.echo(f"{section}:")
+    for group, members in kinds_of().items():
+        typer.echo(f"{group}:")
         for kind, keys in members.items():
-            shown = ", ".join(f"{key}: {_shown(default)}" for key, default in keys.items())
-            typer.echo(f"  {kind:20s} {shown}".rstrip())
-
-
-def _shown(default: object) -> str:
-    """A default as in YAML, or that there is none."""
-    return "required" if default is None else str(default)
+            typer.echo(f"  {kind}")
+            for key, description in keys.items():
+                typer.echo(f"    {key:22s} {description}")
 
 
 @app.command(epilog=f"Example: {DISTRIBUTION} env schema > scenario.schema.json")
@@ -107,24 +104,35 @@ def validate(
 ) -> None:
     """Validate scenarios: faults, or size, thrust authority, range and warnings. Exit code 2 if there is a fault."""
     from formation_env.settings import ConfigError
-    from formation_env.task.domain import facts_of, warnings_of
-    from formation_env.task.loading import load_scenario
 
     faulty = False
     for file in files:
         try:
-            scenario = load_scenario(file)
+            _validate_one(file)
         except ConfigError as error:
             typer.echo(error, err=True)
             faulty = True
-            continue
-        typer.echo(f"{file}: valid")
-        for name, fact in facts_of(scenario).items():
-            typer.echo(f"  {name:28s} {fact}")
-        for warning in warnings_of(scenario):
-            typer.echo(f"{file}: warning: {warning}", err=True)
     if faulty:
         raise typer.Exit(WRONG_INPUT)
+
+
+def _validate_one(file: str) -> None:
+    """Print the facts of a scenario, and on stderr its warnings.
+
+    Raises:
+        ConfigError: the scenario is wrong.
+    """
+    from formation_env.task.domain import DomainWarning, facts_of, warnings_of
+    from formation_env.task.loading import load_scenario
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DomainWarning)  # they are printed below, with others
+        scenario = load_scenario(file)
+    typer.echo(f"{file}: valid")
+    for name, number in facts_of(scenario).items():
+        typer.echo(f"  {name:28s} {number:.6g}")
+    for warning in warnings_of(scenario):
+        typer.echo(f"{file}: warning: {warning}", err=True)
 
 
 @app.command("show-observation", epilog=f"Example: {DISTRIBUTION} env show-observation keeping")

@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import traceback
+import warnings
 from collections.abc import Iterator
 from concurrent.futures import BrokenExecutor
 from typing import Any, Final, NoReturn
@@ -49,7 +50,7 @@ def one_line_errors() -> Iterator[None]:
         SystemExit: with `FAILED`, `WRONG_INPUT` or `INTERRUPTED`.
     """
     try:
-        with _sigterm_as_interrupt():
+        with _sigterm_as_interrupt(), _warnings_in_one_line():
             yield
     except KeyboardInterrupt as error:
         _end(str(error) or "interrupted, nothing written", INTERRUPTED)
@@ -113,6 +114,22 @@ def _is_message(error: Exception) -> bool:
     *_, (frame, _) = traceback.walk_tb(error.__traceback__)
     module = frame.f_globals.get("__name__", "").partition(".")[0]
     return type(error) in (ValueError, RuntimeError) and module in PACKAGES
+
+
+@contextlib.contextmanager
+def _warnings_in_one_line() -> Iterator[None]:
+    """Show warnings without the line of code that issued them."""
+
+    def show(message: Warning | str, category: type[Warning], *rest: Any, **named: Any) -> None:
+        if issubclass(category, UserWarning):
+            print(f"warning: {message}", file=sys.stderr)
+        else:
+            before(message, category, *rest, **named)
+
+    with warnings.catch_warnings():
+        before = warnings.showwarning
+        warnings.showwarning = show
+        yield
 
 
 @contextlib.contextmanager

@@ -230,8 +230,9 @@ def test_kinds_lists_formations_with_keys_and_defaults() -> None:
     from formation_env.formations import FORMATIONS
 
     shown = run("env", "kinds").output
-    assert [kind for kind in (*FORMATIONS, *DROPOUTS) if f"  {kind} " not in shown + " "] == []
-    assert "mean_outage_s" in shown
+    assert [kind for kind in (*FORMATIONS, *DROPOUTS) if f"\n  {kind}\n" not in shown] == []
+    assert re.search(r"\n    mean_outage_s +number, default 600", shown)
+    assert re.search(r"\n    y0_m +number, required", shown)
 
 
 def test_schema_is_json_and_knows_the_keys() -> None:
@@ -246,10 +247,27 @@ def test_validate_prints_size_and_authority(tmp_path: Path) -> None:
     bad.write_text("phases: [{formation: {kind: following, y0_m: -100}, hold_orbits: -1}]\n")
     good = run("env", "validate", "keeping")
     assert good.exit_code == 0, good.output
-    for fact in ("period", "step", "duration", "delta-v"):
-        assert fact in good.output.lower()
-    assert_one_line(run("env", "validate", bad), 2, f"{bad}: phases.0.hold_orbits: must be greater than 0, got -1")
+    shown = {name: float(number) for name, number in re.findall(r"^  (\w+) +(\S+)$", good.stdout, re.MULTILINE)}
+    keeping = load_scenario("keeping")
+    assert shown["num_steps"] == keeping.num_steps
+    assert shown["duration_s"] == keeping.num_steps * keeping.dt_s
+    assert shown["period_s"] == pytest.approx(keeping.orbit.period_s, rel=1e-5)
+    assert shown["delta_v_authority_m_s"] == pytest.approx(0.002 * shown["duration_s"], rel=1e-5)
+    assert shown["max_range_m"] < shown["valid_range_m"]
+    assert {"transfer_least_delta_v_m_s", "curvature_error_m"} <= set(shown)
+    assert_one_line(run("env", "validate", bad), 2, f"{bad}: phases.0.hold_orbits: must be ")
     assert run("env", "validate", bad, "keeping").exit_code == 2
+
+
+def test_validate_warns_of_what_the_models_cannot_describe(tmp_path: Path) -> None:
+    """220 km behind the leader the linear equations are 3.5 km wrong, s^2 / (2 R); one line on stderr, exit code 0."""
+    far = tmp_path / "far.yaml"
+    far.write_text(
+        "phases: [{formation: {kind: following, y0_m: -220e3}, hold_orbits: 1}]\nlimits: {max_distance_m: 1e6}\n"
+    )
+    result = run("env", "validate", far)
+    assert result.exit_code == 0, result.output
+    assert result.stderr.startswith(f"{far}: warning: At 220 km")
 
 
 def test_the_alias_takes_the_commands_of_env() -> None:
