@@ -11,7 +11,7 @@ from agents_helpers import PRETRAINED, small_run
 from typer.testing import CliRunner
 
 from agents import Actor, load_policy
-from agents.__main__ import MISTAKE, app
+from agents.cli import app
 from agents.policy import library
 from agents.policy.actor import Functions, read_actor
 from agents.policy.library import CARD, GRAPH, TENSORS, load_with_card, read_card, shipped_paths
@@ -20,6 +20,7 @@ from agents.results.export import export
 from agents.training.run_folder import BEST, START, load_best, read_pretraining
 from agents.training.train import train
 from formation_env import ConfigError, FormationVectorEnv, load_scenario
+from formation_env.cli_errors import WRONG_INPUT
 from formation_env.evaluation.rollout import evaluate
 from formation_env.evaluation.seeds import seeds
 from formation_env.task.observation import SIZE
@@ -234,7 +235,7 @@ def test_runs_that_do_not_belong_together_are_refused(runs: list[Path], tmp_path
         ([tmp_path], "settings.json: cannot be read"),
     ):
         result = CliRunner().invoke(app, ["export", *map(str, folders), "--out", str(tmp_path / "out")])
-        assert result.exit_code == MISTAKE
+        assert result.exit_code == WRONG_INPUT
         assert fault in result.stderr
         assert result.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()

@@ -12,10 +12,10 @@ from agents_helpers import small_run
 from stable_baselines3 import PPO, SAC
 from typer.testing import CliRunner
 
-from agents.__main__ import MISTAKE, app
 from agents.algorithms.ppo import PPOSettings
 from agents.algorithms.registry import load_settings
 from agents.algorithms.sac import SACSettings
+from agents.cli import app
 from agents.results.evaluate import Sb3Policy
 from agents.training.run_folder import (
     BEST,
@@ -34,6 +34,7 @@ from agents.training.run_settings import plan_run
 from agents.training.train import train, training_seeds
 from agents.training.validation import validate
 from formation_env import ConfigError
+from formation_env.cli_errors import WRONG_INPUT
 from formation_env.evaluation.rollout import evaluate
 from formation_env.evaluation.seeds import seeds
 from formation_env.files import replacing
@@ -178,7 +179,7 @@ def test_faulty_hyperparameters_are_one_line_with_file_and_key(tmp_path: Path, t
 def test_mistakes_on_the_command_line_are_one_line(tmp_path: Path, arguments: list[str], fault: str) -> None:
     """No traceback, and nothing is left on the disk."""
     result = CliRunner().invoke(app, ["train", *arguments, "--steps", "100", "--out", str(tmp_path / "run")])
-    assert result.exit_code == MISTAKE
+    assert result.exit_code == WRONG_INPUT
     assert result.stderr.startswith("error: ")
     assert fault in result.stderr
     assert result.stderr.count("\n") == 1
