@@ -66,9 +66,10 @@ def reproduce(
     command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
 
     def write() -> Path:
-        from baselines.thesis.report import Wanted, write_thesis
+        from baselines.thesis.write_thesis import ThesisOptions, write_thesis
 
-        return write_thesis(out, Wanted(episodes, step_s, claims=claims, models=models), command, processes)
+        options = ThesisOptions(episodes=episodes, step_s=step_s, claims=claims, models=models)
+        return write_thesis(out, options, command, processes)
 
     run_report("reproduce", out, write)
 
