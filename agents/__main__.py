@@ -90,7 +90,17 @@ def train(
         if algorithm is None or env is None:
             raise ConfigError("train: give an algorithm and an environment, or --resume FOLDER")
         run = plan_run(
-            algorithm, env, steps, seed, rows, config, validations, validation_episodes, threads, start, _command()
+            algorithm,
+            env,
+            steps=steps,
+            seed=seed,
+            rows=rows,
+            config=config,
+            validations=validations,
+            validation_episodes=validation_episodes,
+            threads=threads,
+            start=start,
+            command=_command(),
         )
         folder = out or default_folder(run)
         _tell_end(train_run(run, folder, 60 * time_limit), folder)
@@ -141,7 +151,16 @@ def tune(
         from agents.tuning.search import BEST, search
 
         run = plan_run(
-            algorithm, env, steps, seed, rows, config, validations, validation_episodes, 1, start, _command()
+            algorithm,
+            env,
+            steps=steps,
+            seed=seed,
+            rows=rows,
+            config=config,
+            validations=validations,
+            validation_episodes=validation_episodes,
+            start=start,
+            command=_command(),
         )
         folder = study or Path("runs/tuning") / default_folder(run).name.rpartition("_")[0]
         try:

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from baselines.controllers.policy import AccelerationPolicy
-from baselines.design.guidance import Guide
+from baselines.design.guidance import GuidanceName
 from baselines.thesis import scenarios
 from baselines.thesis.fly_laws import FEW, fly_laws
 from baselines.thesis.recorded_flights import Flights
@@ -19,7 +19,7 @@ _ENVIRONMENT_COST: Final = 2
 
 @dataclass(frozen=True)
 class Law:
-    """A control law with the thesis's gains, see `scenarios.law`.
+    """A control law with the thesis's settings, see `scenarios.law`.
 
     Attributes:
         name: of the policy.
@@ -54,7 +54,7 @@ class FlightJob:
     scenario: Scenario
     laws: tuple[Law, ...]
     seeds: tuple[int, ...]
-    guide: Guide = "automatic"
+    guide: GuidanceName = "automatic"
     every: int = 1
     few: int = FEW
     measured: bool = False

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.design.guidance import Guide, desired_states
+from baselines.design.guidance import GuidanceName, desired_states
 from baselines.thesis.recorded_flights import Flights
 from formation_env.envs import interface
 from formation_env.numerics.arrays import Array
@@ -26,7 +26,7 @@ def whole_periods(scenario: Scenario) -> list[int]:
     return [time for time in range(1, longest + 1) if scenario.steps(time) <= scenario.num_steps]
 
 
-def desired_path(scenario: Scenario, guide: Guide) -> Array:
+def desired_path(scenario: Scenario, guide: GuidanceName) -> Array:
     """Desired path (num_steps + 1, 6); the last instant of a leg belongs to that leg."""
     states = np.empty((scenario.num_steps + 1, 6))
     for leg in legs(scenario):
@@ -39,7 +39,7 @@ class FlightRecorder:
     """Accumulates infos step by step into `Flights`."""
 
     def __init__(
-        self, scenario: Scenario, shape: tuple[int, int], steps: NDArray[np.intp], few: int, guide: Guide
+        self, scenario: Scenario, shape: tuple[int, int], steps: NDArray[np.intp], few: int, guide: GuidanceName
     ) -> None:
         count, few = len(steps), min(few, shape[1])
         longest = int(np.diff(steps, prepend=-1).max())

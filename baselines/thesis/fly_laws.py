@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from baselines.design.guidance import Guide
+from baselines.design.guidance import GuidanceName
 from baselines.experiments.policy_batch import SideBySide
 from baselines.thesis.flight_recorder import FlightRecorder, recorded_steps
 from baselines.thesis.measurement_probe import MeasurementProbe, with_final_infos
@@ -22,7 +22,7 @@ def fly_laws(
     policies: Sequence[Policy],
     scenario: Scenario,
     seeds: Sequence[int],
-    guide: Guide = "automatic",
+    guide: GuidanceName = "automatic",
     every: int = 1,
     few: int = FEW,
     measured: bool = False,

@@ -11,9 +11,9 @@ from typing import Any, Final
 import numpy as np
 
 from baselines.controllers.lqr import LQRSettings
-from baselines.controllers.lqr_quasi_static import LQRTrackingSettings
+from baselines.controllers.lqr_quasi_static import LQRQuasiStaticSettings
 from baselines.controllers.policy import AccelerationPolicy
-from baselines.controllers.registry import make_policy, read_gains
+from baselines.controllers.registry import make_policy, read_settings
 from baselines.controllers.weights import Weights
 from formation_env.dropout import NoDropout
 from formation_env.dropout.windows import Window, Windows
@@ -125,20 +125,24 @@ def law(name: str, scenario: Scenario, shipped: str, control_s2: float | None = 
         shipped: name of a settings file in configs/baselines, such as `thesis_keeping`.
         control_s2: factor a of the control weight R = a I / n^2 in place of the printed one, s^2.
     """
-    gains = read_gains(name, config_folder("baselines") / f"{shipped}.yaml")
-    return make_policy(name, scenario, gains if control_s2 is None else reweighted(gains, control_s2))
+    settings = read_settings(name, config_folder("baselines") / f"{shipped}.yaml")
+    return make_policy(name, scenario, settings if control_s2 is None else reweighted(settings, control_s2))
 
 
-def reweighted(gains: Any, control_s2: float) -> LQRSettings | LQRTrackingSettings:
+def reweighted(settings: Any, control_s2: float) -> LQRSettings | LQRQuasiStaticSettings:
     """Settings of a regulator with the control weight R = a I / n^2, a in s^2.
 
     Raises:
         ValueError: settings without a control weight.
     """
     R = Weights(control_s2=(control_s2, control_s2, control_s2)).control_s2
-    if isinstance(gains, LQRTrackingSettings):
-        return replace(gains, hold=replace(gains.hold, control_s2=R), transfer=replace(gains.transfer, control_s2=R))
-    if isinstance(gains, LQRSettings):
-        weights = replace(gains.transfer.weights, control_s2=R)
-        return replace(gains, hold=replace(gains.hold, control_s2=R), transfer=replace(gains.transfer, weights=weights))
-    raise ValueError(f"reweighted: {type(gains).__name__} has no control weight")
+    if isinstance(settings, LQRQuasiStaticSettings):
+        return replace(
+            settings, hold=replace(settings.hold, control_s2=R), transfer=replace(settings.transfer, control_s2=R)
+        )
+    if isinstance(settings, LQRSettings):
+        weights = replace(settings.transfer.weights, control_s2=R)
+        return replace(
+            settings, hold=replace(settings.hold, control_s2=R), transfer=replace(settings.transfer, weights=weights)
+        )
+    raise ValueError(f"reweighted: {type(settings).__name__} has no control weight")

@@ -40,8 +40,8 @@ class Weighted(Law):
         """The policy for a scenario."""
         n = scenario.orbit.mean_motion_rad_s
         control_s2 = tuple(A_S2 * n**4 if axis in self.axes else A_S2 for axis in range(3))
-        gains = super().make(scenario).gains  # type: ignore[attr-defined]
-        return make_policy("lqr", scenario, replace(gains, hold=replace(gains.hold, control_s2=control_s2)))
+        settings = super().make(scenario).settings
+        return make_policy("lqr", scenario, replace(settings, hold=replace(settings.hold, control_s2=control_s2)))
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ class Integrated(Law):
 
     def make(self, scenario: Scenario) -> AccelerationPolicy:
         """The policy for a scenario."""
-        gains = super().make(scenario).gains  # type: ignore[attr-defined]
-        return make_policy("lqr_quasi_static", scenario, replace(gains, feedforward="integrated"))
+        settings = super().make(scenario).settings
+        return make_policy("lqr_quasi_static", scenario, replace(settings, feedforward="integrated"))
 
 
 LQR, TRACKING, SMC = figure_flights.LQR, figure_flights.TRACKING, figure_flights.SMC

@@ -1,4 +1,4 @@
-"""Section 5.2.3: sliding mode control against the LQR, with the thesis's gains."""
+"""Section 5.2.3: sliding mode control against the LQR, with the thesis's settings."""
 
 from functools import partial
 

@@ -143,8 +143,8 @@ def _line(
     line["smc_minus_lqr_m_s"] = float(difference.mean())
     line["low"], line["high"] = bootstrap_interval(difference)
     lqr, smc = chosen["lqr"][index], chosen["smc"][index]
-    line["lqr_gains"] = f"a = {lqr['hold']['control_s2'][0]:.3g}, velocity {lqr['hold']['velocity_s2'][0]:.3g} s^2"
-    line["smc_gains"] = f"decay {smc['surface']['decay_per_s'][0]:.3g}, q {smc['reaching']['q_per_s']:.3g} 1/s"
+    line["lqr_settings"] = f"a = {lqr['hold']['control_s2'][0]:.3g}, velocity {lqr['hold']['velocity_s2'][0]:.3g} s^2"
+    line["smc_settings"] = f"decay {smc['surface']['decay_per_s'][0]:.3g}, q {smc['reaching']['q_per_s']:.3g} 1/s"
     return line
 
 

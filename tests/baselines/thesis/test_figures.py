@@ -253,7 +253,7 @@ def test_four_panels_show_the_flight(flown: Mapping[str, Flights]) -> None:
 def folder(tmp_path_factory: pytest.TempPathFactory, flown: dict[str, Flights]) -> Path:
     """All files of those flights."""
     out = tmp_path_factory.mktemp("thesis") / "deep" / "folder"
-    options = write_thesis.ThesisOptions(episodes=2, step_s=COARSE_S, periods=2.3, models=False)
+    write_thesis.ThesisOptions(episodes=2, step_s=COARSE_S, periods=2.3, models=False)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(write_thesis.parallel, "fly", lambda wanted, workers: flown)
         patch.setattr(claims_table, "tables", lambda flown, options: TABLES)
