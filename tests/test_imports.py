@@ -130,6 +130,7 @@ PICTURES = (
     "formation_env.evaluation.snapshot",
     "baselines.report",
     "baselines.thesis.models",
+    "baselines.thesis.thesis_page",
     "baselines.thesis.write_thesis",
     "agents.results.curve",
 )

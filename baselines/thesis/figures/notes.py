@@ -149,8 +149,9 @@ def _lqr_or_smc(flown: Flown) -> str:
     failure = flown["failure"]
     more = 100 * (failure.delta_v()[FAILED_SMC].mean() / failure.delta_v()[FAILED_LQR].mean() - 1)
     return (
-        f"SMC with the printed settings spends {more:.3g} % more than LQR with the printed weights, but its mean error is "
-        f"{_mean(failure, FAILED_SMC)} against {_mean(failure, FAILED_LQR)}: the thesis's conclusion is not reproduced."
+        f"SMC with the printed settings spends {more:.3g} % more than LQR with the printed weights, but its mean error "
+        f"is {_mean(failure, FAILED_SMC)} against {_mean(failure, FAILED_LQR)}: the thesis's conclusion is not "
+        "reproduced."
     )
 
 
