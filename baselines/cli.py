@@ -107,9 +107,9 @@ def thesis(
     """Reproduce the source thesis: figures, claims and models, with one HTML page."""
 
     def write() -> Path:
-        from baselines.thesis.report import Wanted, write_thesis
+        from baselines.thesis.write_thesis import ThesisOptions, write_thesis
 
-        options = Wanted(episodes=episodes, step_s=step_s, claims=claims, models=models)
+        options = ThesisOptions(episodes=episodes, step_s=step_s, claims=claims, models=models)
         return write_thesis(out, options, command_line(NAME), processes)
 
     write_report_page(out, False, write)

@@ -130,7 +130,9 @@ PICTURES = (
     "formation_env.rendering",
     "formation_env.evaluation.snapshot",
     "baselines.report",
-    "baselines.thesis.models.conclusions",
+    "baselines.thesis.models",
+    "baselines.thesis.thesis_page",
+    "baselines.thesis.write_thesis",
     "agents.results.curve",
 )
 """Modules that plot, and those of the thesis whose names say so."""
