@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from agents_helpers import PRETRAINED, SMALL, assert_refused, small_run
+from damage_helpers import refusals
 from optuna.trial import FrozenTrial, TrialState
 from typer.testing import CliRunner
 
@@ -17,11 +18,11 @@ from agents.algorithms.registry import ALGORITHMS, load_settings
 from agents.training.run_folder import CURVE, START, Run, read_curve
 from agents.training.train import train
 from agents.tuning import search as searching
-from agents.tuning.journal import seal_path
+from agents.tuning.journal import check_seal, seal_path
 from agents.tuning.search import BEST, JOURNAL, MIN_TRIALS_BEFORE_PRUNING, search, task_name
 from agents.tuning.search_space import apply, current_values, search_space
 from baselines.tuning.study import open_study
-from formation_env import ENV_IDS
+from formation_env import ENV_IDS, ConfigError
 
 STEPS = (0, 100, 200)
 BOTTOM = 1e-4
@@ -199,3 +200,22 @@ def test_mistakes_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert_refused(command(tmp_path, "--start", str(tmp_path / "none.safetensors")), "none.safetensors")
     monkeypatch.setitem(sys.modules, "optuna", None)
     assert_refused(command(tmp_path), "pip install 'formation-env[rl,report,optimal]'")
+
+
+def test_a_damaged_journal_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A byte inverted or a cut anywhere in what was sealed; lines behind that, of a killed search, are accepted."""
+    monkeypatch.setattr(searching, "train", bowl)
+    run, journal = small_run(tmp_path, "ppo"), tmp_path / "study" / JOURNAL
+    result = search(run, 2, tmp_path / "study")
+    content = journal.read_bytes()
+
+    def read() -> None:
+        check_seal(journal)
+
+    lines = refusals(journal, content, read, len(content), stride=13)
+    assert len(lines) == len(range(0, len(content), 13)) + 30
+    journal.write_bytes(content + b'{"op_code": 4')
+    assert search(run, 2, tmp_path / "study") == result
+    seal_path(journal).write_text("{}")
+    with pytest.raises(ConfigError, match=r"trials.journal.seal.json: damaged"):
+        search(run, 2, tmp_path / "study")
