@@ -10,8 +10,9 @@ from typing import Annotated, Any, Final, NoReturn
 
 import typer
 
-from baselines.controllers.registry import FLOORS, SLOW, SOLVER
+from baselines.controllers.registry import reference_policies, slow_policies
 from baselines.experiments.policy_factories import classical
+from baselines.optimal.cone_solver import SOLVER
 from formation_env.settings import ConfigError
 from formation_env.task.loading import ENV_IDS
 
@@ -47,7 +48,7 @@ def report(
         from baselines.report import Wanted, write_report
 
         wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, not fine, resume)
-        return write_report(classical(policy or ()), env or list(ENV_IDS), wanted, out, command, processes)
+        return write_report(classical(policy or (), env or ()), env or list(ENV_IDS), wanted, out, command, processes)
 
     run_report("report", out, write)
 
@@ -86,13 +87,13 @@ def sweep(
     """Draw thrust against error as its price moves, and cost against noise, outages, limits and wrong models."""
     command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
     envs = [*(scenarios or ()), *(env or ())] or list(ENV_IDS)
-    names = policy or [name for name in classical() if name not in (*SLOW, *FLOORS)]
+    names = policy or [name for name in classical() if name not in (*slow_policies(), *reference_policies())]
 
     def write() -> Path:
         from baselines.report.write_sweep import Wanted, write_sweep
 
         wanted = Wanted(episodes, bound_episodes, resume)
-        return write_sweep(classical(names), envs, wanted, out, command, processes)
+        return write_sweep(classical(names, envs), envs, wanted, out, command, processes)
 
     run_report("sweep", out, write)
 

@@ -78,11 +78,10 @@ class ModelEpisodes:
         )
 
     def _error_cost(self, misses: Tensor) -> Tensor:
-        """Error term of the reward for position errors (..., 3), m."""
-        reward = self._scenario.reward
-        if reward.error_cost == "quadratic":
-            return (misses**2).sum(dim=-1) / reward.quadratic_scale_m
-        return _norm(misses, SMOOTH_M)
+        """Cost (...) of position errors (..., 3), m, per unit of their weight, smooth at zero."""
+        cost = self._scenario.reward.cost()
+        total = cost.linear * _norm(misses, SMOOTH_M) if cost.linear else torch.zeros(misses.shape[:-1])
+        return total + cost.quadratic * (misses**2).sum(dim=-1) if cost.quadratic else total
 
     def _features(self, step: int, x_hat: Tensor, rest: Tensor) -> Tensor:
         """Network input (rows, SIZE), as the environment and `agents.policy.features` form it."""

@@ -15,7 +15,7 @@ from agents.policy.library import load_policy
 from agents.policy.throttle import throttle
 from agents.training.run_folder import load_best
 from baselines import cost_ratio, fuel_optimal
-from baselines.controllers.registry import SOLVER
+from baselines.optimal.cone_solver import SOLVER
 from formation_env.dynamics import NONLINEAR
 from formation_env.evaluation.rollout import Policy, evaluate
 from formation_env.evaluation.seeds import seeds
@@ -126,7 +126,7 @@ def score(policy: Policy, scenario: Scenario, episodes: int, bound_episodes: int
         Index: metric, `cost_over_bound` the last one if known; columns: mean, low, high, seeds.
     """
     table = evaluate(policy, scenario, seeds("test", episodes))
-    summary = summarise(table).assign(seeds=episodes)
+    summary = summarise(table).rename(columns={"episodes": "seeds"})
     bounded = seeds("test", episodes)[:bound_episodes]
     least = least_costs(scenario, bounded, cache)
     if bounded and least is not None:

@@ -19,7 +19,7 @@ from agents.training.run_folder import Run, read_curve, start_file
 from agents.training.train import check_run, pretrained, train
 from agents.tuning.journal import check_seal, seal
 from agents.tuning.search_space import apply, current_values, search_space
-from baselines.tuning.gain_file import commented
+from baselines.tuning.settings_file import commented
 from baselines.tuning.study import distributions, open_study
 from formation_env.files import write_texts
 from formation_env.settings import ConfigError

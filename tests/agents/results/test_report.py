@@ -222,7 +222,8 @@ def test_a_model_of_ones_own_is_evaluated(kind: type[BaseAlgorithm], tmp_path: P
     expected = summarise(evaluate(Sb3Policy(model, 2.0), START, seeds("test", EPISODES)))
     assert list(printed) == list(expected.index)
     for metric, line in expected.iterrows():
-        np.testing.assert_allclose([float(value) for value in printed[str(metric)][:3]], line, rtol=1e-3, atol=1e-9)
+        means = [float(value) for value in printed[str(metric)][:3]]
+        np.testing.assert_allclose(means, line.iloc[:3], rtol=1e-3, atol=1e-9)
 
 
 def test_a_power_shapes_the_actions_of_a_model(tmp_path: Path) -> None:
