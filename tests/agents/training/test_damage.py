@@ -19,13 +19,13 @@ from agents.training.run_folder import (
     PRETRAINING,
     RUN,
     Run,
-    _revision,
     load_run,
     read_curve,
     read_pretraining,
     run_sha256,
 )
 from agents.training.train import resume, train
+from agents.training.versions import _revision
 from formation_env import ConfigError
 
 
@@ -154,7 +154,7 @@ def test_hostile_checkpoints_are_refused(
 def test_the_revision_is_that_of_the_sources_own_repository(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A package deeper inside some repository, as in a virtual environment, has none; nor has one without git."""
     answers = {"rev-parse": str(tmp_path.resolve()), "describe": "a" * 40}
-    monkeypatch.setattr("agents.training.run_folder._git", lambda folder, verb, *rest: answers[verb])
+    monkeypatch.setattr("agents.training.versions._git", lambda folder, verb, *rest: answers[verb])
     assert _revision(tmp_path / "agents") == "a" * 40
     assert _revision(tmp_path / ".venv" / "site-packages" / "agents") == ""
     monkeypatch.undo()
