@@ -143,7 +143,7 @@ def envs_of(learned: Mapping[str, Learned]) -> list[str]:
         ConfigError: one of them has none.
     """
     names = {load_scenario(env): env for env in (*scenario_names(), *ENV_IDS)}
-    found = {}
+    found: dict[str, None] = {}
     for source in (source for factory in learned.values() for source in factory.sources):
         scenario = _open(source).scenario
         if scenario not in names:

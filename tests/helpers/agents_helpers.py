@@ -58,9 +58,9 @@ def random_actor(squash: str, activation: str = "tanh", power: float = 2.0, widt
     return Actor(layers, Functions(activation, squash, power, 50.0), load_scenario("keeping"))
 
 
-def assert_refused(arguments: list[str], fault: str) -> None:
-    """The command says so in one line."""
+def assert_refused(arguments: list[str], fault: str, last: bool = False) -> None:
+    """The command says so in one line; with `last`, after others."""
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == WRONG_INPUT
     assert fault in result.stderr
-    assert result.stderr.count("\n") == 1
+    assert last or result.stderr.count("\n") == 1

@@ -93,7 +93,7 @@ def test_what_cannot_be_drawn_is_one_line(runs: dict[str, Path], tmp_path: Path)
         ([tmp_path / "none"], "settings.json: cannot be read"),
         ([tmp_path / "begun"], "validation.csv: cannot be read"),
         ([runs["ppo"], "--policy", "lqrr"], "did you mean 'lqr'?"),
-        ([runs["ppo"], tmp_path / "others"], f"validation_episodes: is another than that of {runs['ppo']}"),
+        ([runs["ppo"], tmp_path / "others"], f"validation_episodes: differs from that of {runs['ppo']}"),
     ):
         assert_refused(["plot-curves", *map(str, (*arguments, "--out", tmp_path / "out"))], fault)
     assert not (tmp_path / "out").exists()
