@@ -1,6 +1,6 @@
 """Classical guidance and control policies, and the report about them."""
 
-from baselines.controllers.registry import POLICIES, make_policy
+from baselines.controllers.registry import POLICIES, make_policy, register_policy
 from baselines.design.steady_state_filter import stationary_filter
 from baselines.optimal import OptimalPlan, cost_ratio, fuel_optimal, impulsive_transfer
 
@@ -11,5 +11,6 @@ __all__ = [
     "fuel_optimal",
     "impulsive_transfer",
     "make_policy",
+    "register_policy",
     "stationary_filter",
 ]

@@ -20,9 +20,9 @@ def write_section(path: Path, policy: str, settings: dict[str, Any], comment: st
     Raises:
         OSError: the file cannot be written.
     """
-    text = (
-        path.read_text(encoding="utf-8") if path.is_file() else f"# Gains of the classical policies for {path.stem}.\n"
-    )
+    text = f"# Settings of the classical policies for {path.stem.removesuffix('.baselines')}.\n"
+    if path.is_file():
+        text = path.read_text(encoding="utf-8")
     write_texts(path.parent, {path.name: replace_section(text, policy, section(policy, settings, comment))})
 
 
