@@ -23,6 +23,7 @@ from formation_env.evaluation.rollout import evaluate
 from formation_env.evaluation.seeds import seeds
 from formation_env.numerics.arrays import Array
 from formation_env.settings import ConfigError, build, load_yaml
+from formation_env.task.loading import config_folder
 
 BOTTOM = {"reweighted_lqg.floor": 7e-4, "reweighted_lqg.error_weight_scale": 0.6, "deadband": 0.3}
 """Where the bowl has its least value, 0."""
@@ -279,3 +280,15 @@ def test_gains_in_use_are_tried_too(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     path.write_text("lqr: {deadband: 0.3, reweighted_lqg: {floor: 1e-9, error_weight_scale: 0.6}}\n")
     assert present_gains("lqr", path, KNOBS["lqr"]) == {**BOTTOM, "reweighted_lqg.floor": 1e-5}
     assert present_gains("lqr", tmp_path / "none.yaml", KNOBS["lqr"]) is None
+
+
+def test_settings_of_a_users_scenario_are_written_beside_it(tmp_path: Path) -> None:
+    """Where make_policy looks for them; the package's own files stay as they are."""
+    scenario = tmp_path / "mine.yaml"
+    shipped = config_folder("scenarios") / "initialization.yaml"
+    scenario.write_text(shipped.read_text(encoding="utf-8") + "tolerance_m: 44\n", encoding="utf-8")
+    result = tune(scenario, "--policy", "smc", "--episodes", 2, "--trials", 1, "--studies", tmp_path / "studies")
+    assert result.exit_code == 0, result.output
+    beside = tmp_path / "mine.baselines.yaml"
+    assert make_policy("smc", scenario).settings == read_settings("smc", beside)
+    assert not (config_folder("baselines") / "mine.yaml").exists()
