@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from formation_env.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from baselines.controllers.registry import POLICIES, make_policy
+    from baselines.controllers.registry import POLICIES, make_policy, register_policy
     from baselines.design.steady_state_filter import stationary_filter
     from baselines.optimal import OptimalPlan, cost_ratio, fuel_optimal, impulsive_transfer
 
@@ -21,6 +21,7 @@ __getattr__ = lazy_names(
         "fuel_optimal": "baselines.optimal",
         "impulsive_transfer": "baselines.optimal",
         "make_policy": "baselines.controllers.registry",
+        "register_policy": "baselines.controllers.registry",
         "stationary_filter": "baselines.design.steady_state_filter",
     },
 )
@@ -32,5 +33,6 @@ __all__ = [
     "fuel_optimal",
     "impulsive_transfer",
     "make_policy",
+    "register_policy",
     "stationary_filter",
 ]

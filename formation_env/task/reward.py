@@ -73,7 +73,7 @@ class Reward:
 
 @dataclass(frozen=True)
 class Scoring:
-    """How the position error at each instant (num_steps + 1,) is scored, by the step that ends there.
+    """Scoring of the position error at each instant (num_steps + 1,), by the step that ends there.
 
     Attributes:
         leg: index of the phase that the step belongs to; no step ends at instant 0, whose error is reported by phase 0.
