@@ -44,8 +44,7 @@ def coast(world: World, craft: Spacecraft, states: Array, times_s: Array, *, who
 
     def rates(time_s: float, y: Array) -> Array:
         position, velocity = np.split(y.reshape(-1, 6), 2, axis=1)
-        with np.errstate(over="ignore", invalid="ignore"):  # the integrator refuses what is not finite
-            return np.hstack([velocity, world.acceleration(time_s, position, velocity, craft)]).ravel()
+        return np.hstack([velocity, world.acceleration(time_s, position, velocity, craft)]).ravel()
 
     def height(_: float, y: Array) -> Array:
         return np.asarray(_altitude_m(y).min() - REENTRY_ALTITUDE_M)

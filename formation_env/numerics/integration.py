@@ -59,11 +59,11 @@ def integrate(
 
     if len(times_s) == 0 or times_s[-1] == start_s:
         return np.broadcast_to(start, (len(times_s), *start.shape)).copy()
-    evaluations = 0
+    evaluations, reached = 0, (start_s, start)
 
     def bounded(time_s: float, state: Array) -> Array:
-        nonlocal evaluations
-        evaluations += 1
+        nonlocal evaluations, reached
+        evaluations, reached = evaluations + 1, (time_s, state)
         if evaluations > FREE_EVALUATIONS + EVALUATIONS_PER_PERIOD * abs(time_s - start_s) / period_s:
             raise IntegrationError("too many steps", time_s, state)
         rate = rates(time_s, state)
@@ -73,11 +73,12 @@ def integrate(
 
     events: Any = None if height is None else _ending(height)
     span = (start_s, float(times_s[-1]))
-    solution: Any = solve_ivp(bounded, span, start, "DOP853", times_s, rtol=rtol, atol=atol, events=events)
+    with np.errstate(over="ignore", invalid="ignore"):  # `bounded` refuses what comes of it
+        solution: Any = solve_ivp(bounded, span, start, "DOP853", times_s, rtol=rtol, atol=atol, events=events)
     if solution.status == 1:
         raise IntegrationError("end of the motion", float(solution.t_events[0][0]), solution.y_events[0][0])
     if not solution.success:
-        raise IntegrationError(str(solution.message), float(solution.t[-1]), solution.y[:, -1])
+        raise IntegrationError(str(solution.message), *reached)
     states: Array = solution.y.T
     return states
 
