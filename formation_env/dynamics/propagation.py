@@ -65,5 +65,5 @@ def _nonlinear(states: Array, times_s: Array, world: World, follower: Spacecraft
         instants, places = np.unique(np.abs(times_s[side]), return_inverse=True)
         if len(instants):
             flown = relative_path(world, follower, leader, states.reshape(-1, 6), sign * instants)
-            path[side] = flown[places].reshape(-1, *states.shape)
+            path[side] = flown[places].reshape(len(places), *states.shape)
     return np.moveaxis(path, 0, -2)
