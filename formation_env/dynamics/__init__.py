@@ -5,8 +5,10 @@ from typing import Final
 from formation_env.dynamics.base import DiscreteModel, Dynamics
 from formation_env.dynamics.hcw import HCW
 from formation_env.dynamics.modified_hcw import ModifiedHCW
+from formation_env.dynamics.perturbations import Perturbations
 from formation_env.dynamics.printed_hcw import PrintedHCW
 from formation_env.dynamics.yamanaka_ankersen import YamanakaAnkersen
+from formation_env.orbital.orbit import Orbit
 from formation_env.settings import nearest
 
 DYNAMICS: dict[str, type[Dynamics]] = {
@@ -31,6 +33,23 @@ def get_dynamics(name: str) -> Dynamics:
     return DYNAMICS[name]()
 
 
+def check_truth(name: str, orbit: Orbit, perturbations: Perturbations) -> None:
+    """Refuse a truth that would leave out what other settings ask for.
+
+    Raises:
+        ValueError: perturbations or an elliptic orbit that the model of that name does not know, or no such model.
+    """
+    if name == NONLINEAR:
+        return
+    if perturbations != Perturbations():
+        raise ValueError(f"perturbations: act in the truth nonlinear only, but dynamics is {name!r}")
+    if orbit.eccentricity > 0 and get_dynamics(name).time_invariant:
+        raise ValueError(
+            f"dynamics: {name} is for circular orbits, got orbit.eccentricity = {orbit.eccentricity:g}; use "
+            "yamanaka_ankersen or nonlinear"
+        )
+
+
 __all__ = [
     "DYNAMICS",
     "HCW",
@@ -40,5 +59,6 @@ __all__ = [
     "ModifiedHCW",
     "PrintedHCW",
     "YamanakaAnkersen",
+    "check_truth",
     "get_dynamics",
 ]

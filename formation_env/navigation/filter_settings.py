@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from formation_env.dynamics.spacecraft import Spacecraft
+from formation_env.navigation.sensor import Sigma
 from formation_env.numerics.arrays import Array
 from formation_env.orbital.orbit import Orbit
-from formation_env.settings import NonNegative, Text, settings
+from formation_env.settings import Text, settings
 
 
 @settings
@@ -27,14 +28,14 @@ class KalmanFilter:
     """
 
     dynamics: Text | None = None
-    sigma_pos_m: NonNegative | None = None
-    sigma_vel_m_s: NonNegative | None = None
-    process_noise_m_s2: NonNegative | None = None
-    thrust_noise: NonNegative | None = None
+    sigma_pos_m: Sigma | None = None
+    sigma_vel_m_s: Sigma | None = None
+    process_noise_m_s2: Sigma | None = None
+    thrust_noise: Sigma | None = None
     orbit: Orbit | None = None
     spacecraft: Spacecraft | None = None
-    initial_sigma_pos_m: NonNegative | None = None
-    initial_sigma_vel_m_s: NonNegative | None = None
+    initial_sigma_pos_m: Sigma | None = None
+    initial_sigma_vel_m_s: Sigma | None = None
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,13 @@
 """Settings of the relative navigation sensor."""
 
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from formation_env.settings import NonNegative, settings
+
+Sigma = Annotated[NonNegative, Field(le=1e9)]
+"""1-sigma of a position, m, a velocity, m/s, or an acceleration, m/s^2: up to a million km, far from overflow."""
 
 
 @settings
@@ -16,5 +21,5 @@ class Sensor:
     """
 
     measures: Literal["position_and_velocity", "position"] = "position_and_velocity"
-    sigma_pos_m: NonNegative = 2.0
-    sigma_vel_m_s: NonNegative = 0.02
+    sigma_pos_m: Sigma = 2.0
+    sigma_vel_m_s: Sigma = 0.02

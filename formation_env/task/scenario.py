@@ -9,13 +9,14 @@ import numpy as np
 from pydantic import model_validator
 
 from formation_env.dropout import AnyDropout, GilbertElliott
-from formation_env.dynamics import DYNAMICS, NONLINEAR, DiscreteModel, get_dynamics
-from formation_env.dynamics.nonlinear import World
+from formation_env.dynamics import DYNAMICS, NONLINEAR, DiscreteModel, check_truth, get_dynamics
+from formation_env.dynamics.coasting import check_leader_path
 from formation_env.dynamics.perturbations import Perturbations
 from formation_env.dynamics.spacecraft import Spacecraft
+from formation_env.dynamics.world import World
 from formation_env.formations import AnyFormation, AtLeader
 from formation_env.navigation.filter_settings import FilterModel, KalmanFilter
-from formation_env.navigation.sensor import Sensor
+from formation_env.navigation.sensor import Sensor, Sigma
 from formation_env.orbital.orbit import Orbit
 from formation_env.settings import NonNegative, Positive, Text, nearest, settings
 from formation_env.task.randomization import DomainRandomization
@@ -33,8 +34,8 @@ class Start:
     """
 
     formation: AnyFormation = AtLeader()
-    initial_sigma_pos_m: NonNegative = 10.0
-    initial_sigma_vel_m_s: NonNegative = 0.01
+    initial_sigma_pos_m: Sigma = 10.0
+    initial_sigma_vel_m_s: Sigma = 0.01
 
 
 @settings(renamed={"transfer_periods": "transfer_orbits", "hold_periods": "hold_orbits"})
@@ -98,7 +99,7 @@ class Scenario:
     leader_spacecraft: Spacecraft | None = None
     dynamics: Text = "modified_hcw"
     perturbations: Perturbations = Perturbations()
-    process_noise_m_s2: NonNegative = 5e-6
+    process_noise_m_s2: Sigma = 5e-6
     sensor: Sensor = Sensor()
     filter: KalmanFilter = KalmanFilter()
     dropout: AnyDropout = GilbertElliott()
@@ -119,7 +120,7 @@ class Scenario:
         ):
             if name is not None and name not in known:
                 raise ValueError(f"{key}: no dynamics model named {name!r}; {nearest(name, known)}")
-        self._check_truth()
+        check_truth(self.dynamics, self.orbit, self.perturbations)
         least, greatest = self.spacecraft.min_accel_m_s2, math.sqrt(3) * self.spacecraft.max_accel_m_s2
         if least > greatest:
             raise ValueError(
@@ -132,20 +133,10 @@ class Scenario:
             )
         self._check_clock()
         self._check_start()
+        if self.dynamics == NONLINEAR:
+            check_leader_path(self.world, self.leader, self.num_steps * self.dt_s)
         self.dropout.chain(self.dt_s, self.orbit)
         return self
-
-    def _check_truth(self) -> None:
-        """Refuse a truth that would leave out what other settings ask for."""
-        if self.dynamics == NONLINEAR:
-            return
-        if self.perturbations != Perturbations():
-            raise ValueError(f"perturbations: act in the truth nonlinear only, but dynamics is {self.dynamics!r}")
-        if self.orbit.eccentricity > 0 and get_dynamics(self.dynamics).time_invariant:
-            raise ValueError(
-                f"dynamics: {self.dynamics} is for circular orbits, got orbit.eccentricity = "
-                f"{self.orbit.eccentricity:g}; use yamanaka_ankersen or nonlinear"
-            )
 
     def _check_clock(self) -> None:
         """Refuse too many steps, and phases shorter than a step."""
