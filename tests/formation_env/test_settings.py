@@ -205,7 +205,7 @@ def test_yaml_numbers_that_are_not_finite_are_refused(tmp_path: Path, text: str)
         ("a: 1\n\tb: 2", "line 2: no valid YAML: found character '\\t' that cannot start any token"),
         ("a: *b", "line 1: no valid YAML: found undefined alias 'b'"),
         ("a: 1\n---\na: 2", "line 2: no valid YAML: but found another document"),
-        ("a: 2020-13-45", "no valid YAML: month must be in 1..12"),
+        ("a: 2020-13-45", "line 1: no valid YAML: '2020-13-45' is no timestamp: month must be in 1..12"),
     ],
 )
 def test_broken_yaml(tmp_path: Path, text: str, fault: str) -> None:

@@ -266,7 +266,7 @@ FAULTS = {
     "two documents": (PHASES + "---\n" + PHASES, "line 2: no valid YAML: .*another document"),
     "unknown anchor": (PHASES + "sensor: *x\n", "line 2: no valid YAML: found undefined alias 'x'"),
     "code in YAML": (PHASES + "sensor: !!python/object:os.system {}\n", "line 2: no valid YAML: .* constructor .*"),
-    "no such date": (PHASES + "dt_s: 2020-13-45\n", "no valid YAML: month must be in 1..12"),
+    "no such date": (PHASES + "dt_s: 2020-13-45\n", "line 2: no valid YAML: '2020-13-45' is no timestamp: .*"),
     "not UTF-8": (b"title: \xff\xe9\n", "no valid YAML: .*"),
     "control character": (PHASES + 'title: "\x01"\n', "no valid YAML: .*"),
 }
