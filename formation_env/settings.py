@@ -119,7 +119,7 @@ class OneOf:
     """Annotation of a field that holds an instance of the annotated class.
 
     A mapping becomes an instance of the registry's class that its `kind` key names; the registry is read at each
-    validation, so that classes may be registered later. An instance passes as it is, registered or not.
+    validation, so that classes may be registered later. A hashable instance passes as it is, registered or not.
     """
 
     registry: Mapping[str, type]
@@ -136,6 +136,8 @@ class OneOf:
     def _validate(self, base: Any, data: Any) -> Any:
         """Make an instance of `base` out of a mapping with a known `kind`, or pass one."""
         if isinstance(data, base):
+            if type(data).__hash__ is None:
+                raise PydanticCustomError("unhashable", "must be hashable, such as an instance made with @settings")
             return data
         known = ", ".join(sorted(self.registry))
         if not isinstance(data, Mapping):
