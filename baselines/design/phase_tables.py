@@ -1,4 +1,4 @@
-"""Phases on the clock, as the policies look things up: by phase and by steps left to its end."""
+"""Tables that policies look up by phase and by steps left to the phase's end."""
 
 from collections.abc import Callable
 
@@ -15,7 +15,7 @@ Instants = tuple[NDArray[np.intp], NDArray[np.intp]]
 
 
 def read_instants(observation: NDArray[np.floating], layout: ObservationLayout, dt_s: float) -> Instants:
-    """Where observations (..., SIZE) stand on the clock.
+    """Phase and steps left of observations (..., SIZE).
 
     Args:
         observation: (..., SIZE).
@@ -26,11 +26,11 @@ def read_instants(observation: NDArray[np.floating], layout: ObservationLayout, 
     return layout.phase(observation), steps_left.astype(np.intp)
 
 
-def by_steps_left(scenario: Scenario, values: Callable[[Leg], Array]) -> Array:
-    """A table (phases, steps left, ...) of what a policy needs at each instant; 0 where there is nothing.
+def by_steps_left(scenario: Scenario, values: Callable[[Leg], NDArray[np.floating]]) -> Array:
+    """Tabulate values (phases, steps left, ...) of each instant; 0 where a phase has none.
 
     Args:
-        scenario: what is flown.
+        scenario: gives the phases.
         values: gives the values (count, ...) of a phase, from its beginning on.
     """
     plan = legs(scenario)
@@ -43,7 +43,7 @@ def by_steps_left(scenario: Scenario, values: Callable[[Leg], Array]) -> Array:
 
 
 def nominal_start(scenario: Scenario, leg: Leg) -> Array:
-    """Where a phase should begin (6,): at the reference of the one before, or at the scenario's start."""
+    """Nominal state (6,) at a phase's beginning: the reference of the phase before, or the scenario's start."""
     if leg.index == 0:
         return scenario.start.formation.state(scenario.orbit)
     return leg_reference(scenario, legs(scenario)[leg.index - 1], np.array(leg.start))

@@ -6,6 +6,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from baselines.controllers.registry import POLICIES
+
 NEUTRAL: Final = "#868b94"
 """Grey that reads on light and on dark."""
 GRID: Final = "rgba(128, 134, 144, 0.25)"
@@ -30,30 +32,29 @@ class Look:
     dash: str
 
 
-# Okabe and Ito's colours, told apart by colour-blind readers, but for their black and yellow, which do not read on dark
-# and on light. They do not go round, so symbols differ everywhere, and dashes where two colours may be mistaken.
-_FIXED: Final = {
-    "lqr": Look("#0072B2", "circle", "solid"),
-    "lqr_nominal": Look("#332288", "hexagram", "dashdot"),
-    "mpc": Look("#AA3377", "star", "solid"),
-    "lqr_finite": Look("#7B6FD0", "diamond", "dot"),
-    "lqr_quasi_static": Look("#56B4E9", "square", "dash"),
-    "smc": Look("#D55E00", "triangle-up", "solid"),
-    "two_impulse": Look("#CC79A7", "triangle-down", "solid"),
-    "deadband": Look("#8C6D1F", "pentagon", "dash"),
-    "zero": Look(NEUTRAL, "x", "dot"),
-    "random": Look(NEUTRAL, "cross", "dashdot"),
-}
+# The policies' classes state their looks in Okabe and Ito's colours, which colour-blind readers can tell apart, without
+# black and yellow, which do not read on dark and on light. There are too few of them, so symbols differ everywhere, and
+# dashes where two colours may be mistaken.
 _FREE_COLORS: Final = ("#009E73", "#E69F00")
 _FREE_SYMBOLS: Final = ("hexagon", "hourglass", "bowtie", "diamond-tall")
 _FREE_DASHES: Final = ("solid", "dash", "dot", "dashdot")
 
 
 def looks(policies: Iterable[str]) -> dict[str, Look]:
-    """The look of each policy: the known ones have their own, others get what is free, in order."""
+    """The look of each policy: that of its class, else the next free one, in order."""
     names = list(dict.fromkeys(policies))
-    places = {name: place for place, name in enumerate(name for name in names if name not in _FIXED)}
-    return {name: _FIXED[name] if name in _FIXED else _free(places[name]) for name in names}
+    stated = {name: look for name in names if (look := _stated(name)) is not None}
+    places = {name: place for place, name in enumerate(name for name in names if name not in stated)}
+    return {name: stated[name] if name in stated else _free(places[name]) for name in names}
+
+
+def _stated(name: str) -> Look | None:
+    """The look that a policy's class states; None if it states none, or the policy is a learned one."""
+    policy = POLICIES.get(name)
+    if policy is None:
+        return None
+    color = policy.color or (NEUTRAL if policy.is_reference else None)
+    return None if color is None else Look(color, policy.symbol, policy.dash)
 
 
 def _free(place: int) -> Look:

@@ -10,13 +10,21 @@ from scipy.sparse import coo_matrix, csr_matrix, eye, hstack, kron, vstack
 
 from baselines import make_policy
 from baselines.design.phase_tables import nominal_start, start_error
-from baselines.design.reweighted_lqg import Knowledge, knowledge, reweighted_gains, spread
+from baselines.design.reweighted_lqg import (
+    Knowledge,
+    ReweightedLQGSettings,
+    error_weights,
+    knowledge,
+    reweighted_gains,
+    spread,
+)
 from formation_env import FormationVectorEnv, load_scenario
 from formation_env.dropout import NoDropout
 from formation_env.evaluation.rollout import evaluate
 from formation_env.navigation.sensor import Sensor
+from formation_env.task.reward import Reward
 from formation_env.task.scenario import Scenario, Start
-from formation_env.task.schedule import leg_reference, legs
+from formation_env.task.schedule import build_schedule, column, leg_reference, legs
 
 
 def test_knowledge_settles_at_the_riccati_equation() -> None:
@@ -52,7 +60,23 @@ def test_a_perfect_sensor_leaves_nothing_unknown(dt_s: float) -> None:
     np.testing.assert_allclose(
         known.learned[1:], np.tile(Q_noise, (scenario.num_steps, 1, 1)), atol=1e-9 * Q_noise.max()
     )
-    assert np.isfinite(reweighted_gains(scenario, rounds=0)[0]).all()
+    assert np.isfinite(reweighted_gains(scenario, ReweightedLQGSettings(rounds=0))[0]).all()
+
+
+def test_phases_weigh_errors_as_the_environment_scores_them() -> None:
+    """Together the phases weigh each instant once, as the schedule does; none weighs its first, which it cannot change.
+
+    The first instant of a phase ends a step of the phase before (the first of all ends none), whatever errors on the
+    way cost.
+    """
+    mission = load_scenario("mission")
+    scenario = dataclasses.replace(mission, reward=Reward(error_weight=0.02, transfer_error_weight=0.003))
+    total = np.zeros(scenario.num_steps + 1)
+    for leg in legs(scenario):
+        weights = error_weights(scenario, leg)
+        assert weights[0] == 0
+        total[leg.start : leg.end + 1] += weights
+    np.testing.assert_array_equal(total, column(build_schedule(scenario), "error_weight"))
 
 
 def test_predicted_scatter_is_what_is_flown() -> None:
