@@ -39,7 +39,7 @@ def test_a_kept_plan_is_the_plan(scenario: Scenario, tmp_path: Path, monkeypatch
     (file,) = folder.iterdir()
     assert file.name.startswith("optimal_seed1_")
     assert list(tmp_path.iterdir()) == [tmp_path / "deep"]
-    monkeypatch.setattr(baselines.optimal.lower_bound, "solve", refuse)
+    monkeypatch.setattr(baselines.optimal.lower_bound, "solve_episode", refuse)
     assert same(fuel_optimal(scenario, seed=1, cache_folder=folder), first)
     assert same(unkept, first)
 

@@ -16,7 +16,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from baselines.__main__ import app
+from baselines.cli import app
 from baselines.controllers.registry import make_policy
 from baselines.experiments import parallel
 from baselines.thesis import claim_files, figure_flights, scenarios, write_thesis
@@ -379,7 +379,7 @@ def test_command_says_what_is_wrong_in_one_line(tmp_path: Path, monkeypatch: pyt
     """Options out of range are refused before anything is flown; a folder that cannot be written is named."""
     runner = CliRunner()
     for option in ("--episodes", "--step-s", "--processes"):
-        assert runner.invoke(app, ["reproduce", option, "0"]).exit_code == 2
+        assert runner.invoke(app, ["thesis", option, "0"]).exit_code == 2
     blocked = tmp_path / "file"
     blocked.touch()
 
@@ -388,21 +388,21 @@ def test_command_says_what_is_wrong_in_one_line(tmp_path: Path, monkeypatch: pyt
         return out
 
     monkeypatch.setattr(write_thesis, "write_thesis", write)
-    result = runner.invoke(app, ["reproduce", "--out", str(blocked / "thesis")])
+    result = runner.invoke(app, ["thesis", "--out", str(blocked / "thesis")])
     assert result.exit_code == 1
-    assert result.output.splitlines()[-1] == f"reproduce: {blocked / 'thesis'}: cannot be written: Not a directory"
+    assert result.output.splitlines()[-1] == f"error: {blocked / 'thesis'}: cannot be written: Not a directory"
 
 
 def test_ctrl_c_ends_all_processes_in_one_line(tmp_path: Path) -> None:
     """An interrupt while two processes fly: code 130, one line, nothing written."""
     out = tmp_path / "thesis"
-    command = [sys.executable, "-m", "baselines", "reproduce", "--out", str(out), "--episodes", "2", "--processes", "2"]
+    command = [sys.executable, "-m", "baselines", "thesis", "--out", str(out), "--episodes", "2", "--processes", "2"]
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         process.stderr.read(1)  # the progress bar is there
         process.send_signal(signal.SIGTERM)
         rest = process.stderr.read()
     assert process.returncode == 130
-    assert rest.endswith("reproduce: interrupted, no report written\n")
+    assert rest.endswith("interrupted, no report written\n")
     assert "Traceback" not in rest
     assert not out.exists()
