@@ -23,12 +23,12 @@ help: ## Show this list
 report: $(REPORT) ## Learned and classical policies on the four environments (EPISODES=100 OUT=reports/)
 	$(PY) -m agents report --episodes $(EPISODES) --out $(OUT) $(ARGS)
 
-report-full: $(REPORT) ## The same with all seeds for mpc, too, and finer fronts; goes on where it was interrupted
+report-full: $(REPORT) ## The same with all seeds for mpc and finer fronts; continues after an interrupt
 	$(PY) -m agents report --episodes $(EPISODES) --slow-episodes $(EPISODES) --sweep-episodes 50 --bound-episodes 20 \
 		--fine --resume --out $(OUT)
 
 thesis: $(REPORT) ## The source thesis's figures and claims, reproduced (OUT=reports/): OUT/thesis/thesis.html
-	$(PY) -m baselines reproduce --out $(patsubst %/,%,$(OUT))/thesis $(ARGS)
+	$(PY) -m baselines thesis --out $(patsubst %/,%,$(OUT))/thesis $(ARGS)
 
 test: $(TEST) ## Run the tests (ARGS="-k kalman -n 0")
 	$(PY) -m pytest $(ARGS)
@@ -36,7 +36,7 @@ test: $(TEST) ## Run the tests (ARGS="-k kalman -n 0")
 check: $(TEST) ## Lint, format and type checks
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
-	$(PY) -m mypy formation_env
+	$(PY) -m mypy
 
 bench: $(REPORT) ## Measure environment steps per second (ARGS="...")
 	$(PY) -m formation_env bench $(ARGS)

@@ -65,7 +65,13 @@ def _open(source: Path) -> Actor:
 
 
 def report_models(
-    models: Sequence[str], envs: Sequence[str] | None, wanted: Wanted, out: Path, command: str, workers: int = 1
+    models: Sequence[str],
+    envs: Sequence[str] | None,
+    wanted: Wanted,
+    out: Path,
+    command: str,
+    workers: int = 1,
+    names: Sequence[str] = (),
 ) -> Path:
     """Write the report with the classical policies and learned ones.
 
@@ -78,6 +84,7 @@ def report_models(
         out: folder of the report.
         command: the command line, to be noted.
         workers: processes to fly in.
+        names: of the classical policies; by default all.
 
     Returns:
         Path of the HTML page.
@@ -96,7 +103,7 @@ def report_models(
     def tables(results: Sequence[Results]) -> list[Table]:
         return [learned_table(results, cards)] if any(cards.values()) else []
 
-    return write_report({**classical(), **learned}, flown, wanted, out, command, workers, tables)
+    return write_report({**classical(names), **learned}, flown, wanted, out, command, workers, tables)
 
 
 def _cards(paths: Sequence[Path]) -> list[Card]:
@@ -136,7 +143,7 @@ def envs_of(learned: Mapping[str, Learned]) -> list[str]:
         ConfigError: one of them has none.
     """
     names = {load_scenario(env): env for env in (*scenario_names(), *ENV_IDS)}
-    found = {}
+    found: dict[str, None] = {}
     for source in (source for factory in learned.values() for source in factory.sources):
         scenario = _open(source).scenario
         if scenario not in names:

@@ -92,9 +92,11 @@ class Results:
         return self.interval(policy, metric)[0]
 
     def best_of(self, metric: str) -> list[str]:
-        """The policies with the best mean of a metric; none if all are equal."""
+        """The policies with the best mean of a metric; none if all are equal, or no value is better than another."""
+        if METRICS[metric].better is None:
+            return []
         means = {name: self.mean(name, metric) for name in self.ranking}
-        pick = max if metric in ("return", "in_tolerance") else min
+        pick = max if METRICS[metric].better == "higher" else min
         top = pick(means.values())
         return [name for name, value in means.items() if value == top] if len(set(means.values())) > 1 else []
 
@@ -152,7 +154,7 @@ def estimate(few: pd.DataFrame, reference: pd.DataFrame, bounds: Array | None) -
     rows, summary = {}, summarise(reference)
     for metric in METRICS:
         mean, low, high = _difference(few, reference, metric)
-        base, base_low, base_high = (float(value) for value in summary.loc[metric])
+        base, base_low, base_high = (float(summary.loc[metric, column]) for column in ("mean", "low", "high"))
         below, above = math.hypot(mean - low, base - base_low), math.hypot(high - mean, base_high - base)
         rows[metric] = (base + mean, base + mean - below, base + mean + above)
     return pd.DataFrame.from_dict(rows, orient="index", columns=["mean", "low", "high"])

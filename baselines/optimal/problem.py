@@ -100,7 +100,7 @@ def flown_scenario(scenario: Scenario, seed: int) -> Scenario:
         return scenario
     env = FormationEnv(scenario)
     env.reset(seed=seed)
-    return env.simulation.flown
+    return env.simulation.first_row_scenario
 
 
 def start_of(scenario: Scenario, leg: Leg, initial_state: ArrayLike | None) -> Array:

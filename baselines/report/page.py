@@ -13,20 +13,6 @@ from baselines.report.sweep_section import section
 from baselines.report.words import duration, fewer, headline, number, numbers, reading
 from formation_env.kernel.metrics import METRICS
 
-# Metric: heading, unit, factor.
-COLUMNS: dict[str, tuple[str, str, float]] = {
-    "return": ("cost", "m/s", -1.0),
-    "delta_v_m_s": ("Δv", "m/s", 1.0),
-    "position_error_mean_m": ("mean error", "m", 1.0),
-    "position_error_rms_m": ("rms error", "m", 1.0),
-    "position_error_max_m": ("max error", "m", 1.0),
-    "position_error_arrival_m": ("arrival error", "m", 1.0),
-    "position_error_final_m": ("final error", "m", 1.0),
-    "in_tolerance": ("in tolerance", "% of hold", 100.0),
-    "measurements_lost": ("data lost", "%", 100.0),
-}
-_NEVER_BEST = ("measurements_lost",)
-
 
 def render(results: list[Results], sweep: Sweep, data: dict[str, Any]) -> str:
     """The page of all environments: one file that needs no network.
@@ -108,18 +94,18 @@ def _facts(results: Results) -> list[str]:
 
 
 def _columns() -> list[tuple[str, str, str]]:
-    """Metric, heading and unit of each column; a metric without an entry is shown under its own name."""
-    return [(name, *COLUMNS.get(name, (name, "", 1.0))[:2]) for name in METRICS if name != "steps"]
+    """Metric, heading and unit of each column."""
+    return [(name, metric.heading, metric.unit) for name, metric in METRICS.items() if name != "steps"]
 
 
 def _row(results: Results, name: str) -> dict[str, Any]:
     """A policy's line of the table."""
     cells = []
     for metric, _, _ in _columns():
-        factor = COLUMNS.get(metric, ("", "", 1.0))[2]
+        factor = METRICS[metric].factor
         mean, *ends = numbers(results.interval(name, metric), factor)
         low, high = ends if factor > 0 else ends[::-1]
-        best = metric not in _NEVER_BEST and name in results.best_of(metric)
+        best = name in results.best_of(metric)
         cells.append({"mean": mean, "low": low, "high": high, "best": best})
     ratio = numbers(results.cost_ratios[name]) if results.cost_ratios else None
     return {

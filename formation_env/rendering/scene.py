@@ -1,4 +1,4 @@
-"""The whole picture: two views of the formation, two close-ups of the follower, and what there is to say about them."""
+"""The whole picture: two views of the formation, two close-ups of the follower, and the numbers above them."""
 
 from typing import Any, Final
 
@@ -49,7 +49,7 @@ _PHASE_LEFT_PX: Final = 152
 
 
 class Scene:
-    """The picture of a scenario, drawn again and again.
+    """The picture of a scenario, redrawn for each frame.
 
     Axes, grids, headings and the reference path are drawn once per phase and kept; a frame puts what moves on top.
     """
@@ -87,7 +87,7 @@ class Scene:
         return self._text(left, 466, 10.5, weight="bold")
 
     def _write_titles(self) -> None:
-        """The scenario's title, the views' and the legend, which is one line below the views."""
+        """Write the titles of scenario and views, and the legend below the views."""
         title = self._scenario.title
         self._text(18, 518, 13 * min(1, TITLE_CHARACTERS / max(len(title), 1)), title, weight="bold")
         for view, (*_, name) in zip(self._views, _VIEWS, strict=True):
@@ -120,10 +120,10 @@ class Scene:
         self._background = self._canvas.copy_from_bbox(self._figure.bbox)
 
     def draw(self, moment: Moment, trail: Array, lost: NDArray[np.bool_]) -> Frame:
-        """The picture of a moment.
+        """Draw a moment.
 
         Args:
-            moment: what to show.
+            moment: the moment.
             trail: the follower's positions (points, 3), m.
             lost: whether the measurement was lost at each of them (points,).
 
@@ -143,7 +143,7 @@ class Scene:
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
     def _keep_up(self, moment: Moment) -> None:
-        """A new background for a new phase, and when the follower has left the views: they double."""
+        """Draw a new background for a new phase, or views of twice the width if the follower has left them."""
         distance_m = float(np.abs(moment.truth - self._plan.centre).max())
         doublings = np.ceil(np.log2(max(distance_m / self._half_m, 1.0)))
         if doublings > 0 or self._shown != _stage(self._plan.leg(moment.step), moment.step):
@@ -151,30 +151,35 @@ class Scene:
             self._draw_background(moment.step)
 
     def _values(self, moment: Moment) -> list[str]:
-        """Texts of `_NUMBERS`."""
+        """Texts of `_NUMBERS`, in their order."""
         dt_s, period_s = self._scenario.dt_s, self._scenario.orbit.period_s
         leg = self._plan.leg(moment.step)
         goal = leg.arrival if moment.step < leg.arrival else leg.end
-        sigma_m = np.sqrt(np.trace(moment.covariance) / 3)
-        accel_mm_s2 = 1000 * self._scenario.spacecraft.max_accel_m_s2 * np.linalg.norm(moment.thrust)
+        sigma_m = float(np.sqrt(np.trace(moment.covariance) / 3))
+        accel_mm_s2 = 1000 * self._scenario.spacecraft.max_accel_m_s2 * float(np.linalg.norm(moment.thrust))
         return [
             f"{moment.step * dt_s:.0f} s",
             f"{moment.step * dt_s / period_s:.2f}",
             f"{(goal - moment.step) * dt_s:.0f} s",
-            f"{moment.position_error_m:.1f} m",
-            f"{sigma_m:.1f} m",
-            f"{accel_mm_s2:.2f} mm/s²",
-            f"{moment.delta_v_m_s:.3f} m/s",
+            f"{_readable(moment.position_error_m, 1)} m",
+            f"{_readable(sigma_m, 1)} m",
+            f"{_readable(accel_mm_s2, 2)} mm/s²",
+            f"{_readable(moment.delta_v_m_s, 3)} m/s",
         ]
 
     def _show_link(self, moment: Moment) -> None:
-        """A frame and a badge while measurements are lost."""
+        """Show the link's badge, and a red frame while measurements are lost."""
         self._border.set_visible(not moment.measured)
         text = "LINK UP" if moment.measured else f"LINK LOST  {moment.age_s:.0f} s"
         fill, edge, color = ("white", GREY, GREY) if moment.measured else (RED, RED, "white")
         self._link.set(text=text, color=color, bbox={"fc": fill, "ec": edge, "boxstyle": "round,pad=0.4"})
 
 
+def _readable(value: float, decimals: int) -> str:
+    """A number with some decimals, or two significant digits where these would show fewer."""
+    return f"{value:.{decimals}f}" if value == 0 or abs(value) >= 10.0 ** (1 - decimals) else f"{value:.2g}"
+
+
 def _stage(leg: Leg, step: int) -> tuple[int, bool]:
-    """Which phase, and whether the follower is on its way."""
+    """Index of the phase, and whether the follower is in its transfer."""
     return leg.index, step < leg.arrival

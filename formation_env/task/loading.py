@@ -2,19 +2,11 @@
 
 from importlib.resources import files
 from pathlib import Path
-from typing import Final
 
+from formation_env.registration import ENV_IDS as ENV_IDS
 from formation_env.settings import ConfigError, build, load_yaml, nearest
 from formation_env.task.scenario import Scenario
 from formation_env.task.variants import draw_variants
-
-ENV_IDS: Final = {
-    "FormationInitialization-v0": "initialization",
-    "FormationKeeping-v0": "keeping",
-    "FormationReconfiguration-v0": "reconfiguration",
-    "FormationMission-v0": "mission",
-}
-"""Registered ids and their scenarios."""
 
 
 def config_folder(name: str) -> Path:
