@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from scipy.linalg import solve_discrete_are
+from oracles import filter_covariance
 from scipy.optimize import linprog
 from scipy.sparse import coo_matrix, csr_matrix, eye, hstack, kron, vstack
 
@@ -34,7 +34,7 @@ def test_knowledge_settles_at_the_riccati_equation() -> None:
         scenario = dataclasses.replace(keeping, sensor=Sensor(measures=measures))
         model, H = scenario.filter_dynamics(), np.eye(count, 6)
         R_noise = np.diag(np.repeat([2.0, 0.02], 3)[:count] ** 2)
-        P = solve_discrete_are(model.Phi.T, H.T, 1e-8 * model.Gamma @ model.Gamma.T, R_noise)
+        P = filter_covariance(model.Phi, 1e-4 * model.Gamma, H, R_noise)
         gain = P @ H.T @ np.linalg.inv(H @ P @ H.T + R_noise)
         known = knowledge(scenario, model)
         np.testing.assert_allclose(known.missed[-1], (np.eye(6) - gain @ H) @ P, rtol=1e-3, atol=1e-9)
