@@ -103,7 +103,7 @@ def report_models(
     def tables(results: Sequence[Results]) -> list[Table]:
         return [learned_table(results, cards)] if any(cards.values()) else []
 
-    return write_report({**classical(names), **learned}, flown, wanted, out, command, workers, tables)
+    return write_report({**classical(names, flown), **learned}, flown, wanted, out, command, workers, tables)
 
 
 def _cards(paths: Sequence[Path]) -> list[Card]:

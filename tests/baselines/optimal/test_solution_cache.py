@@ -12,6 +12,9 @@ from baselines.optimal.certificate import least_of_steps
 from formation_env import load_scenario
 from formation_env.task.scenario import Scenario
 
+pytestmark = pytest.mark.filterwarnings("ignore::formation_env.task.domain.DomainWarning")
+"""The transfers here are short, so that they are solved at once; no thrust suffices for them."""
+
 
 @pytest.fixture
 def scenario() -> Scenario:
@@ -97,11 +100,12 @@ def test_least_thrust_of_a_step_is_the_least_on_a_grid() -> None:
 
 
 def test_cost_ratio_is_cost_over_bound() -> None:
-    """Ratios by hand; the interval holds the mean, and equal ratios have none."""
+    """Ratios by hand, Student's t of four of them (quantile 3.182 from tables); equal ratios have no interval."""
     result = cost_ratio([2.0, 3.0, 1.0, 6.0], [1.0, 2.0, 1.0, 2.0])
     np.testing.assert_allclose(result.ratios, [2, 1.5, 1, 3])
     assert result.mean == pytest.approx(1.875)
-    assert 1 <= result.low < result.mean < result.high <= 3
+    half = 3.182 * np.std([2, 1.5, 1, 3], ddof=1) / 2
+    assert (result.low, result.high) == pytest.approx((1.875 - half, 1.875 + half), rel=1e-3)
     equal = cost_ratio([2.0, 4.0], [1.0, 2.0])
     assert (equal.mean, equal.low, equal.high) == (2, 2, 2)
 
