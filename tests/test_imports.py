@@ -16,7 +16,19 @@ PACKAGES = ("formation_env", "baselines", "agents")
 # environment; what the environments tell Gymnasium about rendering is a module that needs nothing.
 LAYERS = {
     "formation_env": (
-        {"numerics", "settings", "files", "lazy", "registration", "rendering.modes"},
+        {
+            "numerics",
+            "config_files",
+            "docstrings",
+            "files",
+            "lazy",
+            "quantities",
+            "registration",
+            "settings",
+            "short_values",
+            "yaml_loader",
+            "rendering.modes",
+        },
         {"orbital"},
         {"dynamics"},
         {"formations", "dropout", "navigation"},
@@ -151,7 +163,7 @@ def test_the_sources_are_read() -> None:
     assert {package(name) for name in FILES} == set(PACKAGES)
     seen = {(found.source, found.target, found.lazy) for found in IMPORTS}
     assert ("formation_env.kernel.stages.kalman_filter", "formation_env.kernel.kalman", False) in seen
-    assert ("formation_env.settings", "ruamel.yaml", True) in seen
+    assert ("formation_env.config_files", "formation_env.yaml_loader", True) in seen
 
 
 def test_packages_import_one_way() -> None:

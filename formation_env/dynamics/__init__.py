@@ -1,4 +1,7 @@
-"""Models of the relative motion. To add a linear one: a file with a `Dynamics` subclass, and a line here."""
+"""Models of the relative motion.
+
+To add a linear one: a file with a `Dynamics` subclass and a line here, or `register_dynamics` from outside the package.
+"""
 
 from typing import Final
 
@@ -20,6 +23,18 @@ DYNAMICS: dict[str, type[Dynamics]] = {
 
 NONLINEAR: Final = "nonlinear"
 """Name of the truth that is no linear model, see `formation_env.dynamics.nonlinear`."""
+
+
+def register_dynamics(name: str, cls: type[Dynamics]) -> None:
+    """Register a linear model under a name, so that scenarios may name it.
+
+    Raises:
+        ValueError: the class is no `Dynamics`, or another model has this name.
+    """
+    if not issubclass(cls, Dynamics):
+        raise ValueError(f"{cls.__name__}: must inherit from Dynamics")
+    if name == NONLINEAR or DYNAMICS.setdefault(name, cls) is not cls:
+        raise ValueError(f"{cls.__name__}: a dynamics model named {name!r} exists already")
 
 
 def get_dynamics(name: str) -> Dynamics:
@@ -61,4 +76,5 @@ __all__ = [
     "YamanakaAnkersen",
     "check_truth",
     "get_dynamics",
+    "register_dynamics",
 ]

@@ -1,15 +1,15 @@
 """A spacecraft: its drag and its thruster."""
 
-from typing import Annotated
-
-from pydantic import Field
-
-from formation_env.settings import NonNegative, Positive, settings
-
-SEA_LEVEL_DENSITY_KG_M3 = 1.225
-"""Density of the air at sea level: nothing flies through more."""
-GREATEST_ACCEL_M_S2 = 1e4
-"""A thousand g: beyond any thruster, and far from where squares overflow."""
+from formation_env.quantities import (
+    Acceleration,
+    AirDensity,
+    Area,
+    Coefficient,
+    Mass,
+    PositiveAcceleration,
+    ThrustNoise,
+)
+from formation_env.settings import settings
 
 
 @settings
@@ -27,14 +27,14 @@ class Spacecraft:
         thrust_noise: 1-sigma of the relative error of the thrust's magnitude, drawn anew each step.
     """
 
-    mass_kg: Annotated[Positive, Field(ge=1e-3, le=1e7)] = 50.0
-    area_m2: Annotated[NonNegative, Field(le=1e6)] = 0.16
-    drag_coefficient: Annotated[NonNegative, Field(le=100)] = 1.0
-    air_density_kg_m3: Annotated[NonNegative, Field(le=SEA_LEVEL_DENSITY_KG_M3)] = 1.04e-13
-    radiation_coefficient: Annotated[NonNegative, Field(le=100)] = 1.0
-    max_accel_m_s2: Annotated[Positive, Field(le=GREATEST_ACCEL_M_S2)] = 0.1
-    min_accel_m_s2: Annotated[NonNegative, Field(le=GREATEST_ACCEL_M_S2)] = 0.0
-    thrust_noise: Annotated[NonNegative, Field(le=10)] = 0.0
+    mass_kg: Mass = 50.0
+    area_m2: Area = 0.16
+    drag_coefficient: Coefficient = 1.0
+    air_density_kg_m3: AirDensity = 1.04e-13
+    radiation_coefficient: Coefficient = 1.0
+    max_accel_m_s2: PositiveAcceleration = 0.1
+    min_accel_m_s2: Acceleration = 0.0
+    thrust_noise: ThrustNoise = 0.0
 
     @property
     def drag_area_per_mass_m2_kg(self) -> float:

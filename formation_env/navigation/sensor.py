@@ -1,13 +1,9 @@
 """Settings of the relative navigation sensor."""
 
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import Field
-
-from formation_env.settings import NonNegative, settings
-
-Sigma = Annotated[NonNegative, Field(le=1e9)]
-"""1-sigma of a position, m, a velocity, m/s, or an acceleration, m/s^2: up to a million km, far from overflow."""
+from formation_env.quantities import Distance, Speed
+from formation_env.settings import settings
 
 
 @settings
@@ -21,5 +17,5 @@ class Sensor:
     """
 
     measures: Literal["position_and_velocity", "position"] = "position_and_velocity"
-    sigma_pos_m: Sigma = 2.0
-    sigma_vel_m_s: Sigma = 0.02
+    sigma_pos_m: Distance = 2.0
+    sigma_vel_m_s: Speed = 0.02

@@ -19,13 +19,13 @@ def test_weights_without_a_regulator_are_one_clear_error(policy: str) -> None:
     settings: dict[str, Any] = {"design": "weights"} if policy == "lqr" else {}
     with pytest.raises(ConfigError, match=r"^weights: position \[0.0, 0.0, 0.0\] and .* set position weights > 0$"):
         make_policy(policy, "keeping", {**settings, "hold": NO_POSITION})
-    with pytest.raises(ConfigError, match="^weights: position and velocity_s2 are all 0"):
+    with pytest.raises(ConfigError, match=r"^weights: position and velocity_s2 are all 0"):
         make_policy(policy, "keeping", {**settings, "hold": NOTHING})
 
 
 def test_a_transfer_without_a_goal_is_an_error() -> None:
     """A last state of no weight: the gains were 0, the follower coasted."""
-    with pytest.raises(ConfigError, match="^weights: position and velocity_s2 are all 0"):
+    with pytest.raises(ConfigError, match=r"^weights: position and velocity_s2 are all 0"):
         make_policy("lqr_finite", "initialization", {"transfer": NOTHING})
 
 
@@ -50,5 +50,5 @@ def test_other_units_are_tried() -> None:
     def give_up(_: float) -> float:
         raise ValueError("reordering failed")
 
-    with pytest.raises(ConfigError, match="^no solution$"):
+    with pytest.raises(ConfigError, match=r"^no solution$"):
         in_some_units(give_up, "no solution")
