@@ -91,7 +91,7 @@ def test_a_run_s_model_needs_no_throttle_power(finished: tuple[Run, Path]) -> No
     """It has its own; given another, it would be applied twice."""
     run, folder = finished
     assert_refused(
-        ["evaluate", str(folder / MODEL), "--env", run.env, "--allow-pickle", "--throttle-power", "2"],
+        ["evaluate", str(folder / MODEL), run.env, "--allow-pickle", "--throttle-power", "2"],
         f"--throttle-power: leave it out; {folder / MODEL} applies its own, 2.0",
         last=True,
     )
