@@ -19,7 +19,7 @@ from formation_env.files import check_writable
 NAME = "agents"
 PROGRAM = f"{DISTRIBUTION} {NAME}"
 
-Algorithm = Annotated[str, typer.Argument(help="ppo or sac.", show_default=False)]
+Algorithm = Annotated[str, typer.Argument(help="Algorithm: ppo or sac.", show_default=False)]
 Config = Annotated[Path | None, typer.Option(help="YAML file of hyperparameters.", show_default="configs/agents")]
 Steps = Annotated[int | None, typer.Option(min=1, help="Environment steps.", show_default="from --config")]
 Rows = Annotated[int | None, typer.Option(min=1, help="Parallel environments.", show_default="from --config")]
@@ -48,9 +48,9 @@ app = make_app("Reinforcement learning: train policies, plot their curves, evalu
 @app.command(
     epilog=f"Example: {PROGRAM} train ppo FormationKeeping-v0 --out runs/mine; continue: --out runs/mine --resume"
 )
-def train(
+def train(  # longer than 40 lines: each option has its line
     context: typer.Context,
-    algorithm: Annotated[str | None, typer.Argument(help="ppo or sac.", show_default=False)] = None,
+    algorithm: Annotated[str | None, typer.Argument(help="Algorithm: ppo or sac.", show_default=False)] = None,
     env: Annotated[
         str | None, typer.Argument(help="Registered id, scenario name or YAML file.", show_default=False)
     ] = None,

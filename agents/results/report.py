@@ -147,7 +147,7 @@ def envs_of(learned: Mapping[str, Learned]) -> list[str]:
     for source in (source for factory in learned.values() for source in factory.sources):
         scenario = _open(source).scenario
         if scenario not in names:
-            raise ConfigError(f"--env: {source} was trained on a scenario of its own; name its file")
+            raise ConfigError(f"ENV: {source} was trained on a scenario of its own; name its file")
         found[names[scenario]] = None
     return list(found)
 
