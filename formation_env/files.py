@@ -64,3 +64,25 @@ def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
     with contextlib.ExitStack() as stack:
         for name, content in contents.items():
             stack.enter_context(replacing(folder / name)).write_bytes(content)
+
+
+def check_writable(folder: Path) -> None:
+    """Find out before the work whether a folder can be made and written; leaves nothing behind.
+
+    Args:
+        folder: it need not exist; then its nearest existing parent is tried.
+
+    Raises:
+        OSError: it cannot; the error names the folder.
+    """
+    nearest = next(parent for parent in (folder, *folder.absolute().parents) if os.path.lexists(parent))
+    try:
+        with tempfile.TemporaryDirectory(dir=nearest, prefix=".writable.") as scratch:
+            (Path(scratch) / "probe").write_bytes(bytes(4096))  # a full disk still makes empty files
+    except OSError as error:
+        raise OSError(error.errno, f"cannot be written: {error.strerror or error}", str(folder)) from None
+
+
+def is_checkout() -> bool:
+    """Whether this is a checkout, whose configs/ and policies may be written, and no installed package."""
+    return (Path(__file__).parents[1] / "pyproject.toml").is_file()

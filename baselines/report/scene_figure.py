@@ -1,4 +1,6 @@
-"""The flights of all policies in space, in the leader's frame."""
+"""The recorded episodes in space, in the leader's frame."""
+
+from collections.abc import Sequence
 
 import numpy as np
 import plotly.graph_objects as go
@@ -16,14 +18,20 @@ _LEAST_SIDE = 0.3
 _POSITION = ["x_m", "y_m", "z_m"]
 
 
-def scene_figure(results: Results, looks: Looks) -> go.Figure:
-    """True paths, reference paths, leader, starts and arrivals; one scale for all three axes."""
+def scene_figure(results: Results, looks: Looks, policies: Sequence[str] = ()) -> go.Figure:
+    """True paths, reference paths, leader, starts and arrivals; one scale for all three axes.
+
+    Args:
+        results: of the environment.
+        looks: of the policies.
+        policies: to draw; by default all.
+    """
     flown = results.flown
     figure = go.Figure()
     for trace in _plan(flown.scenario):
         figure.add_trace(trace)
     visible = [_corners(flown.scenario)]
-    for name in results.ranking:
+    for name in policies or results.ranking:
         flight = flown.flights[name]
         path = 1e-3 * flight[_POSITION].to_numpy()[style.thinned(len(flight))]
         trace = _curve(path, name, {"color": looks[name].color, "width": 4})
@@ -85,7 +93,7 @@ def _box(points: np.ndarray) -> np.ndarray:
 
 
 def _unseen(corners: np.ndarray) -> go.Scatter3d:
-    """Points that only make the axes hold them."""
+    """Invisible points that extend the axes."""
     return _points(corners, "", "circle", 1).update(opacity=0, showlegend=False, hoverinfo="skip", hovertemplate=None)
 
 

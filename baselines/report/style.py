@@ -1,4 +1,4 @@
-"""Colours, symbols and axes that all pictures share."""
+"""Colours, symbols and axes that all figures share."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ GRID: Final = "rgba(128, 134, 144, 0.25)"
 SHADE: Final = "rgba(128, 134, 144, 0.20)"
 FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', sans-serif"
 MAX_POINTS: Final = 1500
-"""Points of one line or cloud; longer ones are thinned out."""
+"""Points of a line or cloud; longer ones are thinned out."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """How a policy is drawn, everywhere the same.
+    """How a policy is drawn in every figure.
 
     Attributes:
         color: of dots and lines.
@@ -30,34 +30,34 @@ class Look:
     dash: str
 
 
-# Okabe and Ito's colours, told apart by colour-blind readers, but for their black and yellow, which do not read on dark
-# and on light. They do not go round, so symbols differ everywhere, and dashes where two colours may be mistaken.
+# Based on Okabe and Ito's colours, which colour-blind readers can tell apart; all have a contrast of 3 or more on the
+# light and on the dark page. They are too few, so symbols differ everywhere, and dashes where two colours are close.
 _FIXED: Final = {
     "lqr": Look("#0072B2", "circle", "solid"),
-    "lqr_nominal": Look("#332288", "hexagram", "dashdot"),
-    "mpc": Look("#AA3377", "star", "solid"),
-    "lqr_finite": Look("#7B6FD0", "diamond", "dot"),
-    "lqr_quasi_static": Look("#56B4E9", "square", "dash"),
+    "lqr_nominal": Look("#6C5CE7", "hexagram", "dashdot"),
+    "mpc": Look("#C2408A", "star", "solid"),
+    "lqr_finite": Look("#8E7CC3", "diamond", "dot"),
+    "lqr_quasi_static": Look("#3D9BD1", "square", "dash"),
     "smc": Look("#D55E00", "triangle-up", "solid"),
     "two_impulse": Look("#CC79A7", "triangle-down", "solid"),
-    "deadband": Look("#8C6D1F", "pentagon", "dash"),
+    "deadband": Look("#9A7B2C", "pentagon", "dash"),
     "zero": Look(NEUTRAL, "x", "dot"),
     "random": Look(NEUTRAL, "cross", "dashdot"),
 }
-_FREE_COLORS: Final = ("#009E73", "#E69F00")
+_FREE_COLORS: Final = ("#009E73", "#C98500")
 _FREE_SYMBOLS: Final = ("hexagon", "hourglass", "bowtie", "diamond-tall")
 _FREE_DASHES: Final = ("solid", "dash", "dot", "dashdot")
 
 
 def looks(policies: Iterable[str]) -> dict[str, Look]:
-    """The look of each policy: the known ones have their own, others get what is free, in order."""
+    """The look of each policy: classical policies have fixed looks, others get free ones in order."""
     names = list(dict.fromkeys(policies))
     places = {name: place for place, name in enumerate(name for name in names if name not in _FIXED)}
     return {name: _FIXED[name] if name in _FIXED else _free(places[name]) for name in names}
 
 
 def _free(place: int) -> Look:
-    """A look that no known policy has."""
+    """A look that no classical policy has."""
     color, dash = place % len(_FREE_COLORS), place // len(_FREE_COLORS) % len(_FREE_DASHES)
     return Look(_FREE_COLORS[color], _FREE_SYMBOLS[place % len(_FREE_SYMBOLS)], _FREE_DASHES[dash])
 

@@ -64,7 +64,7 @@ class Job:
         """How long it takes, in steps of one law; the number of seeds hardly matters."""
         return self.scenario.num_steps * (_ENVIRONMENT_COST + len(self.laws))
 
-    def fly(self, progress: Callable[[int], Any]) -> Flights:
+    def run(self, progress: Callable[[int], Any]) -> Flights:
         """Fly it; progress is called with the cost of what was flown since the last call."""
         share = _ENVIRONMENT_COST + len(self.laws)
         return fly(

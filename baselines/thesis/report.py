@@ -73,12 +73,12 @@ def write_thesis(out: Path, wanted: Wanted, command: str, workers: int) -> Path:
         ValueError: too many episodes.
         OSError: the folder cannot be written; nothing in it has changed then.
     """
-    work: dict[str, parallel.Work] = dict(plan.jobs(seeds("test", wanted.episodes), wanted.step_s, wanted.periods))
+    work: dict[str, parallel.Job] = dict(plan.jobs(seeds("test", wanted.episodes), wanted.step_s, wanted.periods))
     if wanted.claims:
         work |= table.jobs(wanted.effort)
     if wanted.models:
         work |= report.jobs(seeds("test", wanted.episodes))
-    flown = parallel.fly(work, workers)
+    flown = parallel.run_with_bar(work, workers)
     contents: dict[str, bytes] = {}
     with style.settings():
         bar = tqdm(FIGURES.items(), desc="drawing", unit="figure", dynamic_ncols=True)

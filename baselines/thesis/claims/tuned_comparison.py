@@ -100,7 +100,7 @@ class Comparison:
         steps = keeping(self.truth, self.fails, self.effort, TUNING_STEP_S).num_steps
         return 3 * len(LAWS) * self.effort.candidates**2 * steps
 
-    def fly(self, progress: Callable[[int], Any]) -> list[dict[str, Any]]:
+    def run(self, progress: Callable[[int], Any]) -> list[dict[str, Any]]:
         """One line per price: the tuned laws' costs and the difference with its 95 % interval."""
         chosen = {law: self._tuned(law) for law in LAWS}
         progress(self.cost // 2)

@@ -70,7 +70,7 @@ def _believing(scenario: Scenario, dynamics: str) -> Scenario:
 
 @dataclass(frozen=True)
 class Trial:
-    """All laws of a comparison in one world, on the same seeds; a `Work` of `baselines.experiments.parallel`.
+    """All laws of a comparison in one world, on the same seeds; a `Job` of `baselines.experiments.parallel`.
 
     Attributes:
         comparison: what is flown.
@@ -92,7 +92,7 @@ class Trial:
         """How long it takes, in steps of one law; most of it is the design of the laws."""
         return 5_000 * len(self.comparison.laws)
 
-    def fly(self, progress: Callable[[int], Any] = lambda _: None) -> pd.DataFrame:
+    def run(self, progress: Callable[[int], Any] = lambda _: None) -> pd.DataFrame:
         """One line per episode: scenario, world, policy, seed, cost_m_s, delta_v_m_s, position_error_mean_m."""
         gains = config_folder("baselines") / f"{self.comparison.gains}.yaml"
         policies = [make_policy(law, self.scenario, gains) for law in self.comparison.laws]

@@ -103,7 +103,7 @@ def strayed(orbit: Orbit, states: Array) -> dict[str, Array]:
 
 @dataclass(frozen=True)
 class Survey:
-    """Errors of every model, formation and size about one leader; a `Work` of `baselines.experiments.parallel`.
+    """Errors of every model, formation and size about one leader; a `Job` of `baselines.experiments.parallel`.
 
     Attributes:
         orbit: the leader's.
@@ -118,7 +118,7 @@ class Survey:
         """How long it takes, in steps of one law."""
         return 15_000
 
-    def fly(self, progress: Callable[[int], Any] = lambda _: None) -> pd.DataFrame:
+    def run(self, progress: Callable[[int], Any] = lambda _: None) -> pd.DataFrame:
         """One line per model, formation, size and span: j2, inclination_deg, eccentricity, those, error_m."""
         closed = closing(self.orbit)
         states = np.array(

@@ -7,7 +7,7 @@ from typing import Any, Final
 import pandas as pd
 from matplotlib.figure import Figure
 
-from baselines.experiments.parallel import Work
+from baselines.experiments.parallel import Job
 from baselines.thesis.figures import style
 from baselines.thesis.models import closed_loop_costs, conclusions, open_loop_errors
 from baselines.thesis.models import figures as figures
@@ -38,7 +38,7 @@ class Found:
     costs: pd.DataFrame
 
 
-def jobs(seeds: Sequence[int]) -> dict[str, Work]:
+def jobs(seeds: Sequence[int]) -> dict[str, Job]:
     """All that is flown, by name, for `jobs.run`; seeds are those of the closed loops."""
     surveys = [open_loop_errors.Survey(orbit) for orbit in open_loop_errors.leaders()]
     trials = [

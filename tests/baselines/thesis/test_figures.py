@@ -169,7 +169,7 @@ def test_initialization_is_the_printed_one(periods: float, error_m: float, accel
 
     The errors to 0.1 m are those of an independent prototype of the trajectory-following law (eq. 4.17-4.19).
     """
-    flights = plan.initializations()[f"initialization {periods:g}"].fly(lambda cost: None)
+    flights = plan.initializations()[f"initialization {periods:g}"].run(lambda cost: None)
     assert flights.max_error()[0, 0] == pytest.approx(error_m, abs=0.1)
     assert flights.max_accel()[0, 0] < accel_m_s2
 
@@ -181,7 +181,7 @@ def test_keeping_is_the_printed_one() -> None:
     The rest of the effort undoes the unknown start.
     """
     job = plan.keepings((0,), periods=1.0)["keeping"]
-    flights = replace(job, laws=(plan.LQR,)).fly(lambda cost: None)
+    flights = replace(job, laws=(plan.LQR,)).run(lambda cost: None)
     assert flights.max_error()[0, 0] == pytest.approx(300.0, rel=0.02)
     assert flights.max_accel()[0, 0] < 4e-3
     assert flights.effort()[0, 0, 2] > 0.9 * flights.effort()[0, 0].sum()
@@ -244,7 +244,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, flown: dict[str, Flights]) 
     """All files of those flights."""
     out = tmp_path_factory.mktemp("thesis") / "deep" / "folder"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report.parallel, "fly", lambda wanted, workers: flown)
+        patch.setattr(report.parallel, "run_with_bar", lambda wanted, workers: flown)
         patch.setattr(table, "tables", lambda flown, effort: TABLES)
         page = report.write_thesis(out, report.Wanted(2, COARSE_S, 2.3, models=False), "the <command>", 1)
     assert page == out / report.PAGE
@@ -311,7 +311,7 @@ def test_a_failure_leaves_the_old_files(folder: Path, monkeypatch: pytest.Monkey
         raise RuntimeError("no ink")
 
     monkeypatch.setitem(FIGURES, "5.27", replace(FIGURES["5.27"], draw=broken))
-    monkeypatch.setattr(report.parallel, "fly", lambda wanted, workers: {})
+    monkeypatch.setattr(report.parallel, "run_with_bar", lambda wanted, workers: {})
     for number in list(FIGURES)[:-1]:
         monkeypatch.delitem(FIGURES, number)
     with pytest.raises(RuntimeError, match="no ink"):
