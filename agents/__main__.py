@@ -90,7 +90,17 @@ def train(
         if algorithm is None or env is None:
             raise ConfigError("train: give an algorithm and an environment, or --resume FOLDER")
         run = plan_run(
-            algorithm, env, steps, seed, rows, config, validations, validation_episodes, threads, start, _command()
+            algorithm,
+            env,
+            steps=steps,
+            seed=seed,
+            rows=rows,
+            config=config,
+            validations=validations,
+            validation_episodes=validation_episodes,
+            threads=threads,
+            start=start,
+            command=_command(),
         )
         folder = out or default_folder(run)
         _tell_end(train_run(run, folder, 60 * time_limit), folder)
@@ -141,7 +151,16 @@ def tune(
         from agents.tuning.search import BEST, search
 
         run = plan_run(
-            algorithm, env, steps, seed, rows, config, validations, validation_episodes, 1, start, _command()
+            algorithm,
+            env,
+            steps=steps,
+            seed=seed,
+            rows=rows,
+            config=config,
+            validations=validations,
+            validation_episodes=validation_episodes,
+            start=start,
+            command=_command(),
         )
         folder = study or Path("runs/tuning") / default_folder(run).name.rpartition("_")[0]
         try:
@@ -233,10 +252,17 @@ def report(
 
     def write() -> Path:
         from agents.results.report import report_models
-        from baselines.report import Wanted
+        from baselines.report import ReportOptions
 
-        wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, not fine, resume)
-        return report_models(model or [], env, wanted, out, _command(), processes)
+        options = ReportOptions(
+            episodes=episodes,
+            slow_episodes=slow_episodes,
+            sweep_episodes=sweep_episodes,
+            sweep_bound_episodes=bound_episodes,
+            coarse=not fine,
+            resume=resume,
+        )
+        return report_models(model or [], env, options, out, _command(), processes)
 
     run_report("report", out, write)
 

@@ -10,8 +10,9 @@ from typing import Annotated, Any, Final, NoReturn
 
 import typer
 
-from baselines.controllers.registry import FLOORS, SLOW, SOLVER
+from baselines.controllers.registry import reference_policies, slow_policies
 from baselines.experiments.policy_factories import classical
+from baselines.optimal.cone_solver import SOLVER
 from formation_env.settings import ConfigError
 from formation_env.task.loading import ENV_IDS
 
@@ -44,10 +45,17 @@ def report(
     command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
 
     def write() -> Path:
-        from baselines.report import Wanted, write_report
+        from baselines.report import ReportOptions, write_report
 
-        wanted = Wanted(episodes, slow_episodes, sweep_episodes, bound_episodes, not fine, resume)
-        return write_report(classical(policy or ()), env or list(ENV_IDS), wanted, out, command, processes)
+        options = ReportOptions(
+            episodes=episodes,
+            slow_episodes=slow_episodes,
+            sweep_episodes=sweep_episodes,
+            sweep_bound_episodes=bound_episodes,
+            coarse=not fine,
+            resume=resume,
+        )
+        return write_report(classical(policy or (), env or ()), env or list(ENV_IDS), options, out, command, processes)
 
     run_report("report", out, write)
 
@@ -86,13 +94,13 @@ def sweep(
     """Draw thrust against error as its price moves, and cost against noise, outages, limits and wrong models."""
     command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
     envs = [*(scenarios or ()), *(env or ())] or list(ENV_IDS)
-    names = policy or [name for name in classical() if name not in (*SLOW, *FLOORS)]
+    names = policy or [name for name in classical() if name not in (*slow_policies(), *reference_policies())]
 
     def write() -> Path:
-        from baselines.report.write_sweep import Wanted, write_sweep
+        from baselines.report.write_sweep import SweepOptions, write_sweep
 
-        wanted = Wanted(episodes, bound_episodes, resume)
-        return write_sweep(classical(names), envs, wanted, out, command, processes)
+        options = SweepOptions(episodes=episodes, bound_episodes=bound_episodes, resume=resume)
+        return write_sweep(classical(names, envs), envs, options, out, command, processes)
 
     run_report("sweep", out, write)
 

@@ -28,7 +28,7 @@ LAYERS = {
         {"", "__main__"},
     ),
     "baselines": (
-        {"design"},
+        {"design", "result_cache"},
         {"optimal"},
         {"controllers"},
         {"experiments"},

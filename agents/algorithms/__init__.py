@@ -1,1 +1,1 @@
-"""PPO and SAC of Stable-Baselines3, fitted to the environments."""
+"""Learning algorithms: PPO and SAC of Stable-Baselines3, adapted to the environments."""

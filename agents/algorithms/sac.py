@@ -1,125 +1,132 @@
-"""SAC for an actor that can already fly."""
+"""Soft actor-critic: hyperparameters and how they become a learner."""
 
-import copy
-from typing import Any
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, ClassVar, Self
 
-import numpy as np
-import torch
-from numpy.typing import NDArray
-from stable_baselines3 import SAC
-from stable_baselines3.common.noise import ActionNoise
-from stable_baselines3.common.type_aliases import ReplayBufferSamples
-from stable_baselines3.common.utils import polyak_update, update_learning_rate
-from torch import Tensor, nn
-from torch.nn import functional
+from pydantic import model_validator
 
-from agents.hyperparameters import SACSettings
+from agents.hyperparameters import (
+    CommonSettings,
+    Network,
+    NonNegativeInt,
+    PositiveInt,
+    PositiveShare,
+    SearchRange,
+    Widths,
+)
+from formation_env.settings import Flag, NonNegative, Positive, Probability, Real, settings
+from formation_env.task.scenario import Scenario
+
+if TYPE_CHECKING:
+    from stable_baselines3.common.base_class import BaseAlgorithm
+    from stable_baselines3.common.vec_env import VecEnv
 
 
-class CriticFirstSAC(SAC):
-    """SAC whose critics learn first, and whose actor learns slowly and stays near the one that it began with.
-
-    What differs from SB3's: critics may be ahead of the actor in time, number of updates and learning rate; their
-    errors count by Huber's loss, since a few far-off episodes cost a hundred times the rest; targets and actor see the
-    critics' mean; some steps of the flights are kicked; and distance from the first actor is part of the actor's loss.
+@settings(renamed={"share": "probability", "low": "sigma_min", "high": "sigma_max"})
+class ExplorationImpulses:
+    """Sparse random impulses; most n-step returns contain none and so stay near on-policy.
 
     Attributes:
-        how: its hyperparameters.
-        random_start: whether the steps before the first update are flown at random, and not by the actor.
-        anchor: from features to outputs, as the actor was when it began; None after random weights.
+        probability: of an impulse in a step.
+        sigma_min: standard deviation of the throttle's impulse in the first row.
+        sigma_max: in the last row; the rows between form a geometric series.
     """
 
-    how: SACSettings
-    random_start: bool = True
-    anchor: nn.Module | None = None
+    probability: PositiveShare = 0.03
+    sigma_min: Positive = 0.02
+    sigma_max: Positive = 0.3
 
-    def keep_near(self) -> None:
-        """Have the actor, as it is now, be the one to stay near to, and to fly from the first step on."""
-        self.anchor = copy.deepcopy(nn.Sequential(self.actor.latent_pi, self.actor.mu)).requires_grad_(False)
-        self.random_start = False
-
-    def train(self, gradient_steps: int, batch_size: int = 64) -> None:
-        """Update the critics, and now and then the actor, on what is remembered."""
-        self.policy.set_training_mode(True)
-        self._update_learning_rate(self.critic.optimizer)
-        late = self.num_timesteps - self.how.actor_delay_steps
-        losses: dict[str, list[float]] = {"critic_loss": [], "actor_loss": []}
-        for update in range(self._n_updates, self._n_updates + gradient_steps):
-            losses["critic_loss"].append(self._update_critics(self._remembered(batch_size)))
-            if late > 0 and update % self.how.actor_every == 0:
-                self._slow_down(1 - late / (self._total_timesteps - self.how.actor_delay_steps))
-                losses["actor_loss"].append(self._update_actor(self._remembered(self.how.actor_batch_size)))
-        self._n_updates += gradient_steps
-        for name, values in losses.items():
-            if values:
-                self.logger.record(f"train/{name}", np.mean(values))
-
-    def _remembered(self, count: int) -> ReplayBufferSamples:
-        return self.replay_buffer.sample(count, env=self._vec_normalize_env)
-
-    def _slow_down(self, share_left: float) -> None:
-        """Have the actor's learning rate fall linearly to nothing."""
-        for optimizer in (self.actor.optimizer, self.ent_coef_optimizer):
-            update_learning_rate(optimizer, self.how.actor_learning_rate * max(share_left, 0.0))
-
-    def _update_critics(self, data: ReplayBufferSamples) -> float:
-        """One step towards r + gamma (Q' - alpha log pi), r and gamma being those of n steps."""
-        if self.use_sde:
-            self.actor.reset_noise()
-        with torch.no_grad():
-            actions, log_prob = self.actor.action_log_prob(data.next_observations)
-            following = _mean(self.critic_target(data.next_observations, actions))
-            following -= self.log_ent_coef.exp() * log_prob.reshape(-1, 1)
-            discounts = self.gamma if data.discounts is None else data.discounts
-            target = data.rewards + (1 - data.dones) * discounts * following
-        values = self.critic(data.observations, data.actions)
-        loss = torch.stack([functional.smooth_l1_loss(value, target) for value in values]).sum()
-        _descend(self.critic.optimizer, loss)
-        polyak_update(self.critic.parameters(), self.critic_target.parameters(), self.tau)
-        return loss.item()
-
-    def _update_actor(self, data: ReplayBufferSamples) -> float:
-        """One step of actor and temperature."""
-        if self.use_sde:
-            self.actor.reset_noise()
-        mean, log_std, parts = self.actor.get_action_dist_params(data.observations)
-        actions, log_prob = self.actor.action_dist.log_prob_from_params(mean, log_std, **parts)
-        values = _mean(self.critic(data.observations, actions)).squeeze(1)
-        loss = (self.log_ent_coef.detach().exp() * log_prob - values + self._distance(mean, data.observations)).mean()
-        _descend(self.actor.optimizer, loss)
-        _descend(self.ent_coef_optimizer, -(self.log_ent_coef * (log_prob.detach() + self.target_entropy)).mean())
-        return loss.item()
-
-    def _distance(self, mean: Tensor, observations: Tensor) -> Tensor:
-        """Price (rows,) of throttles tanh(mean) that differ from those of the actor that it began with."""
-        if self.anchor is None:
-            return torch.zeros(len(mean))
-        begun = self.anchor(self.actor.extract_features(observations, self.actor.features_extractor))
-        return self.how.anchor_weight * ((mean.tanh() - begun.tanh()) ** 2).sum(dim=1)
-
-    def _sample_action(
-        self, learning_starts: int, action_noise: ActionNoise | None = None, n_envs: int = 1
-    ) -> tuple[NDArray[Any], NDArray[Any]]:
-        action, kept = super()._sample_action(learning_starts if self.random_start else 0, action_noise, n_envs)
-        return (action, kept) if self.how.kicks is None else self._kicked(kept)
-
-    def _kicked(self, throttles: NDArray[np.float32]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Throttles (rows, 3) with what the rows' kicks add to some, as they are flown and remembered."""
-        rng, kicks = self.action_space.np_random, self.how.kicks
-        sizes = np.geomspace(kicks.low, kicks.high, len(throttles)) * (rng.random(len(throttles)) < kicks.share)
-        kicked = (throttles + sizes[:, None] * rng.standard_normal(throttles.shape)).clip(-1, 1).astype(np.float32)
-        return kicked, kicked
-
-    def _excluded_save_params(self) -> list[str]:
-        return [*super()._excluded_save_params(), "anchor"]
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        """Refuse an inverted range."""
+        if self.sigma_min > self.sigma_max:
+            raise ValueError(f"sigma_min: must be at most sigma_max = {self.sigma_max}, got {self.sigma_min}")
+        return self
 
 
-def _mean(values: tuple[Tensor, ...]) -> Tensor:
-    """The mean (rows, 1) of what the critics say."""
-    return torch.cat(values, dim=1).mean(dim=1, keepdim=True)
+@settings(renamed={"anchor_weight": "behaviour_regularizer_weight", "kicks": "exploration_impulses"})
+class SACSettings(CommonSettings):
+    """Soft actor-critic (Haarnoja et al. 2018), with a learnt temperature; see `agents.algorithms.sac_learner`.
 
+    Attributes:
+        gradient_steps: updates of the critics after each step of all rows.
+        batch_size: samples of each.
+        buffer_size: capacity of the replay buffer; its transitions are part of the checkpoint, at 330 bytes each.
+        learning_starts: steps flown before the first update: at random, or by a pretrained actor.
+        learning_rate: of the critics, initially; it falls linearly to `learning_rate_end` at the last step.
+        learning_rate_end: final value.
+        tau: step size of the target critics' moving average.
+        n_steps: rewards that are summed before the critics are asked for the rest (n-step returns).
+        after_state: whether the critics are given the cost and effect of a thrust, see
+            `algorithms.afterstate_critic`.
+        critic_hidden: width of each hidden layer of the critics.
+        entropy_init: initial temperature.
+        target_entropy: entropy of the throttles that the temperature aims at, in nats; low, since noise costs fuel.
+        actor_delay_steps: until this step only the critics learn.
+        actor_learning_rate: of actor and temperature, initially; it falls linearly to zero.
+        actor_every: updates of the critics for each of the actor.
+        actor_batch_size: samples of an actor update.
+        behaviour_regularizer_weight: penalty, in scaled rewards, on the squared distance between the throttles and
+            those of the pretrained actor.
+        exploration_impulses: impulses added to the throttles that are flown; none if left out.
+    """
 
-def _descend(optimizer: torch.optim.Optimizer, loss: Tensor) -> None:
-    optimizer.zero_grad()
-    loss.backward()
-    optimizer.step()
+    search_space: ClassVar[Mapping[str, SearchRange]] = MappingProxyType(
+        {
+            "learning_rate": SearchRange(3e-6, 1e-3),
+            "tau": SearchRange(1e-3, 0.05),
+            "gamma": SearchRange(0.9, 1, log=False),
+            "entropy_init": SearchRange(1e-6, 1e-2),
+            "target_entropy": SearchRange(-20, 0, log=False),
+            "log_std_init": SearchRange(-5, -1, log=False),
+        }
+    )
+
+    steps: PositiveInt = 200_000
+    gradient_steps: PositiveInt = 8
+    batch_size: PositiveInt = 256
+    buffer_size: PositiveInt = 300_000
+    learning_starts: PositiveInt = 3_200
+    learning_rate: Positive = 1e-3
+    learning_rate_end: NonNegative = 1e-3
+    gamma: Probability = 0.98
+    tau: PositiveShare = 0.02
+    n_steps: PositiveInt = 1
+    after_state: Flag = False
+    critic_hidden: Widths = (64, 64)
+    entropy_init: Positive = 0.01
+    target_entropy: Real = -6.0
+    actor_delay_steps: NonNegativeInt = 0
+    actor_learning_rate: Positive = 1e-3
+    actor_every: PositiveInt = 1
+    actor_batch_size: PositiveInt = 256
+    behaviour_regularizer_weight: NonNegative = 0.0
+    exploration_impulses: ExplorationImpulses | None = None
+    reward_scale: Positive = 10.0
+    network: Network = Network(activation="relu")
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        """Refuse reward normalisation with critics that assume the thrust's cost."""
+        if self.after_state and self.normalise_reward:
+            raise ValueError("normalise_reward: must be false with after_state, whose critics assume the thrust's cost")
+        return self
+
+    def check_scenario(self, scenario: Scenario) -> None:
+        """Refuse after-state critics where the variants of a scenario have no common model."""
+        if scenario.domain_randomization and self.after_state:
+            raise ValueError("agent.after_state: must be false for a scenario with domain_randomization, got true")
+
+    def make_model(self, env: "VecEnv", seed: int) -> "BaseAlgorithm":
+        """Build SAC on `env`."""
+        from agents.algorithms.sac_learner import make_sac
+
+        return make_sac(self, env, seed)
+
+    def on_warm_start(self, model: "BaseAlgorithm") -> None:
+        """Regularise towards the pretrained actor."""
+        from agents.algorithms.sac_learner import CriticFirstSAC
+
+        assert isinstance(model, CriticFirstSAC), "make_model gave it"
+        model.regularise_towards_current_actor()

@@ -1,8 +1,8 @@
-"""Potential-based reward shaping: what training may see, and no report.
+"""Potential-based reward shaping, for training only; reports never contain it.
 
-With F = gamma Phi(s') - Phi(s) added to the reward the best policy stays the best (Ng, Harada & Russell 1999), since
-over an episode all that is added is -Phi of its start, whatever is flown. The potential is minus the weighted miss at
-arrival if the follower only coasts, so that a burn is rewarded at once for the error that it takes away.
+Adding F = gamma Phi(s') - Phi(s) to the reward preserves the optimal policy (Ng, Harada & Russell 1999), since the sum
+over an episode is -Phi of its start whatever is flown. The potential is minus the weighted zero-effort miss at arrival,
+so that a burn is rewarded at once for the error that it removes.
 """
 
 import numpy as np
@@ -13,13 +13,13 @@ from formation_env.task.scenario import Scenario
 
 
 class Shaping:
-    """Adds the difference of the potential to the rewards of rows."""
+    """Shaping term of the rows of a batched environment."""
 
     def __init__(self, scenario: Scenario, weight: float, gamma: float) -> None:
-        """Set what stays.
+        """Fix the potential.
 
         Args:
-            scenario: what is flown.
+            scenario: task that is flown.
             weight: of the potential, (m/s) per m.
             gamma: the learner's discount per step.
         """
@@ -31,21 +31,22 @@ class Shaping:
     def potential(self, observations: NDArray[np.float32]) -> NDArray[np.float64]:
         """Minus the weighted miss at arrival (...), m/s, of observations (..., SIZE)."""
         miss_m = self._layout.state(observations, "zero_effort_miss")[..., :3]
-        return -self._weight * np.sqrt(np.square(miss_m).sum(axis=-1))
+        potential: NDArray[np.float64] = -self._weight * np.sqrt(np.square(miss_m).sum(axis=-1))
+        return potential
 
     def restart(self, observations: NDArray[np.float32]) -> None:
-        """Go on from observations (rows, SIZE)."""
+        """Set the potential before the next step from observations (rows, SIZE)."""
         self._before = self.potential(observations)
 
     def added(
         self, observations: NDArray[np.float32], ended: NDArray[np.bool_], last: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        """What a step adds to the rewards (rows,), m/s.
+        """Shaping term of a step (rows,), m/s.
 
         Args:
             observations: after the step (rows, SIZE); of the next episode in rows that ended.
-            ended: which rows did (rows,).
-            last: potentials that the ended rows' episodes came to (ended,): 0 for an end that is one.
+            ended: whether a row's episode ended (rows,).
+            last: final potentials of the rows that ended (ended,): 0 after a termination.
         """
         next_potentials = self.potential(observations)
         reached = next_potentials.copy()

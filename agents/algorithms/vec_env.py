@@ -21,12 +21,12 @@ Row = dict[str, Any]
 
 
 class Sb3VecEnv(VecEnv):
-    """Rows of a `FormationVectorEnv` as Stable-Baselines3 wants them.
+    """Adapter of a `FormationVectorEnv` to Stable-Baselines3's interface.
 
-    The info of a row is empty but at the end of its episode; then it has `terminal_observation`,
-    `TimeLimit.truncated`, `episode` as SB3's Monitor gives it (return `r` in m/s as it is reported, whatever is learnt
-    from; length `l`, seconds `t`), and `episode_totals` (metrics by name). The list of infos is one and the same all
-    the time, and so is the dict of a row in which no episode has just ended: read them, and do not keep them.
+    The info of a row is empty except at the end of its episode; then it has `terminal_observation`,
+    `TimeLimit.truncated`, `episode` as SB3's Monitor gives it (return `r` in m/s as reported, without scaling or
+    shaping; length `l`, seconds `t`), and `episode_totals` (metrics by name). The list of infos is reused from step to
+    step, and so is the dict of a row whose episode goes on: copy what shall be kept.
     """
 
     def __init__(
@@ -46,11 +46,11 @@ class Sb3VecEnv(VecEnv):
             scenario: a registered id, a scenario's name or path, or a Scenario.
             reward_scale: rewards are multiplied by this, units per m/s.
             throttle_power: p of the thrust sign(z) |z|^p that an action z stands for; see `agents.policy.throttle`.
-            shaping: what is added to the rewards before they are multiplied.
-            bootstrap_end: tell of the plan's end as `TimeLimit.truncated`, so that SB3 adds the value of the last
-                observation there; else as an end behind which nothing counts, which is how returns are reported.
-            stagger: begin the rows' episodes evenly spread over an episode's length, not all at once, so that each
-                rollout sees all parts of the mission. Until a row's first end it is where coasting took it.
+            shaping: potential-based term, added to the rewards before they are scaled.
+            bootstrap_end: report the end of the episode as `TimeLimit.truncated`, so that SB3 adds the value of the
+                last observation; else as a termination, which is how returns are reported.
+            stagger: spread the starts of the rows' episodes evenly over an episode's length, so that each rollout sees
+                all parts of the mission. Until its first end a row is where coasting took it.
         """
         self.batch = FormationVectorEnv(num_envs, load_scenario(scenario))
         self.reward_scale = reward_scale
@@ -59,7 +59,7 @@ class Sb3VecEnv(VecEnv):
         self.bootstrap_end = bootstrap_end
         self.stagger = stagger
         self._infos: Infos = [{} for _ in range(num_envs)]
-        self._told = np.zeros(0, np.intp)
+        self._rows_with_info = np.zeros(0, np.intp)
         self._actions = np.zeros((num_envs, 3), np.float32)
         self._birth_s = time.perf_counter()
         super().__init__(num_envs, self.batch.single_observation_space, self.batch.single_action_space)
@@ -76,18 +76,18 @@ class Sb3VecEnv(VecEnv):
         return observations
 
     def memory(self) -> NDArray[np.float64]:
-        """All that the rows carry from one step to the next; a copy."""
+        """Copy of the state that the rows carry from one step to the next."""
         return self.batch.simulation.memory()
 
     def recall(self, memory: NDArray[np.float64], observations: NDArray[np.float32]) -> None:
-        """Go on from what `memory` gave, and from the observations (num_envs, SIZE) of that moment."""
+        """Continue from a state that `memory` gave and the observations (num_envs, SIZE) at that time."""
         self.batch.reset(seed=0)
         self.batch.simulation.recall(memory)
         if self.shaping is not None:
             self.shaping.restart(observations)
 
     def _batch_options(self) -> dict[str, Any] | None:
-        """The rows' options as one; an option is given to all rows or to none."""
+        """Merge the rows' options; an option is given to all rows or to none."""
         keys = {key for options in self._options for key in options}
         for key in keys:
             if not all(key in options for options in self._options):
@@ -95,7 +95,7 @@ class Sb3VecEnv(VecEnv):
         return {key: np.stack([options[key] for options in self._options]) for key in keys} or None
 
     def _spread(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Coast for an episode, and on the way begin the rows' next episodes one after the other."""
+        """Coast for an episode and restart the rows one after the other on the way."""
         length = self.batch.scenario.num_steps
         begins = np.arange(self.num_envs) * length // self.num_envs
         coast = np.zeros((self.num_envs, 3), np.float32)
@@ -115,22 +115,24 @@ class Sb3VecEnv(VecEnv):
         observations, rewards, terminations, truncations, batch_infos = self.batch.step(self._actions)
         ended = terminations | truncations
         interrupted = truncations & ~terminations & self.bootstrap_end
-        self._tell(batch_infos, np.flatnonzero(ended), interrupted)
+        self._update_infos(batch_infos, np.flatnonzero(ended), interrupted)
         if self.shaping is not None:
             rewards += self.shaping.added(observations, ended, self._last_potentials(ended, interrupted))
         return observations, (self.reward_scale * rewards).astype(np.float32), ended, self._infos
 
-    def _tell(self, batch_infos: dict[str, Any], ended: NDArray[np.intp], interrupted: NDArray[np.bool_]) -> None:
-        """Put the infos of the rows that ended into the list, and take those of the step before out of it."""
-        for row in self._told:
+    def _update_infos(
+        self, batch_infos: dict[str, Any], ended: NDArray[np.intp], interrupted: NDArray[np.bool_]
+    ) -> None:
+        """Enter the infos of the rows that ended, and clear those of the step before."""
+        for row in self._rows_with_info:
             self._infos[row] = {}
         for row in ended.tolist():
             self._infos[row] = self._last_info(batch_infos, row)
             self._infos[row]["TimeLimit.truncated"] = bool(interrupted[row])
-        self._told = ended
+        self._rows_with_info = ended
 
     def _last_potentials(self, ended: NDArray[np.bool_], interrupted: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """The potentials that the ended rows came to: 0, but where the value of the last observation counts."""
+        """Final potentials of the ended rows: 0 after a termination, else that of the last observation."""
         last = np.zeros(len(ended))
         if self.shaping is not None and interrupted.any():
             seen = np.stack([self._infos[row]["terminal_observation"] for row in np.flatnonzero(interrupted)])
@@ -138,7 +140,7 @@ class Sb3VecEnv(VecEnv):
         return last[ended]
 
     def _last_info(self, infos: dict[str, Any], row: int) -> Row:
-        """What SB3 wants to know of a row's episode that has ended."""
+        """SB3's info of a row whose episode has ended."""
         totals = infos["final_info"][interface.TOTALS]
         totals = {name: float(values[row]) for name, values in totals.items() if not name.startswith("_")}
         age_s = round(time.perf_counter() - self._birth_s, 6)
@@ -153,31 +155,38 @@ class Sb3VecEnv(VecEnv):
         self.batch.close()
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of the batched environment, once for each row asked for: the rows share it."""
+        """Give an attribute of the batched environment, once per requested row: the rows share it."""
         return [getattr(self.batch, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: VecEnvIndices = None) -> None:
-        """Set an attribute of the batched environment; of all rows, since they share it."""
-        self._all_rows("set_attr", attr_name, indices)
+        """Set an attribute of the batched environment, for all rows, since they share it."""
+        self._require_all_rows("set_attr", attr_name, indices)
         setattr(self.batch, attr_name, value)
 
     def env_method(  # the base class's signature
         self, method_name: str, *method_args: Any, indices: VecEnvIndices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Call a method of the batched environment, once; its result is given for each row."""
-        self._all_rows("env_method", method_name, indices)
+        """Call a method of the batched environment once and repeat its result for each row."""
+        self._require_all_rows("env_method", method_name, indices)
         return [getattr(self.batch, method_name)(*method_args, **method_kwargs)] * self.num_envs
 
-    def _all_rows(self, what: str, name: str, indices: VecEnvIndices) -> None:
+    def _require_all_rows(self, call: str, name: str, indices: VecEnvIndices) -> None:
         if sorted(self._get_indices(indices)) != list(range(self.num_envs)):
-            raise ValueError(f"{what}: {name}: the rows share one environment, so indices must be all of them or None")
+            raise ValueError(f"{call}: {name}: the rows share one environment, so indices must be all of them or None")
 
     def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
-        """Whether the rows are wrapped: as by Monitor, whose part is done here; by nothing else."""
+        """Whether the rows are wrapped: by Monitor, whose records are kept here, and by nothing else."""
         from stable_baselines3.common.monitor import Monitor
 
         return [issubclass(wrapper_class, Monitor) for _ in self._get_indices(indices)]
 
     def get_images(self) -> Sequence[NDArray[np.uint8] | None]:
-        """No pictures: render a single environment instead."""
+        """Return no images; render a single environment instead."""
         return [None] * self.num_envs
+
+
+def batched_env(env: VecEnv) -> Sb3VecEnv:
+    """The adapter of the batched environment below SB3's wrappers."""
+    inner = env.unwrapped
+    assert isinstance(inner, Sb3VecEnv), "make_env gives no other"
+    return inner

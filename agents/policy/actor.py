@@ -1,4 +1,4 @@
-"""A learned policy at run time: a small network in numpy, kept in a safetensors file; no torch, no SB3."""
+"""A learned policy at run time: a small network in numpy, stored in a safetensors file; no torch, no SB3."""
 
 import itertools
 import json
@@ -35,7 +35,7 @@ def _elu(x: Array32) -> Array32:
 
 
 def _clip(x: Array32) -> Array32:
-    return np.minimum(np.maximum(x, _LOW), _HIGH)  # for three numbers faster than np.clip
+    return np.minimum(np.maximum(x, _LOW), _HIGH)  # faster than np.clip for three numbers
 
 
 ACTIVATIONS: Final[dict[str, Callable[[Array32], Array32]]] = {"tanh": np.tanh, "relu": _relu, "elu": _elu}
@@ -44,13 +44,13 @@ SQUASHES: Final[dict[str, Callable[[Array32], Array32]]] = {"clip": _clip, "tanh
 
 @dataclass(frozen=True)
 class Functions:
-    """What stands between and behind the layers.
+    """Functions between and after the layers.
 
     Attributes:
-        activation: one of `ACTIVATIONS`, after every layer but the last.
-        squash: one of `SQUASHES`, after the last: to [-1, 1].
-        throttle_power: p of the thrust sign(z) |z|^p that the squashed output z stands for.
-        magnification: of the errors that the first layer reads, see `agents.policy.features`.
+        activation: one of `ACTIVATIONS`, after every layer except the last.
+        squash: one of `SQUASHES`, after the last layer: to [-1, 1].
+        throttle_power: p of the thrust sign(z) |z|^p for the squashed output z.
+        magnification: factor of the errors in the input, see `agents.policy.features`.
     """
 
     activation: str
@@ -59,7 +59,7 @@ class Functions:
     magnification: float = 1.0
 
     def __post_init__(self) -> None:
-        """Refuse what no actor can be made of."""
+        """Refuse unknown functions and parameters out of range."""
         for name, known in (("activation", ACTIVATIONS), ("squash", SQUASHES)):
             given = getattr(self, name)
             if given not in known:
@@ -74,21 +74,21 @@ class Actor:
 
     Attributes:
         layers: weights and biases, first to last.
-        functions: what stands between and behind them.
-        scenario: what it was trained on.
+        functions: functions between and after them.
+        scenario: task that it was trained on.
     """
 
     def __init__(self, layers: Sequence[Layer], functions: Functions, scenario: Scenario) -> None:
-        """Make the actor.
+        """Check the layers.
 
         Raises:
-            ConfigError: the layers do not lead from an observation to an action, or are not finite.
+            ConfigError: the layers do not map an observation to an action, or are not finite.
         """
         check_layers(layers)
         self.layers = tuple(layers)
         self.functions = functions
         self.scenario = scenario
-        # Transposed, one product serves one observation and a batch alike.
+        # With transposed weights the same product serves one observation and a batch.
         self._hidden = [(np.ascontiguousarray(weight.T), bias) for weight, bias in layers]
         self._last_weight, self._last_bias = self._hidden.pop()
         self._activation = ACTIVATIONS[functions.activation]
@@ -97,13 +97,13 @@ class Actor:
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Array32, Any]:
-        """Actions for one observation or for a batch, as Stable-Baselines3's policies give them.
+        """Actions for one observation or a batch, with the signature of Stable-Baselines3's policies.
 
         Args:
             observation: (SIZE,) or (rows, SIZE).
-            state: handed back as it is.
-            episode_start: not needed.
-            deterministic: makes no difference.
+            state: returned unchanged.
+            episode_start: ignored.
+            deterministic: ignored; the actor is deterministic.
 
         Returns:
             Actions (3,) or (rows, 3), float32 in [-1, 1], in units of max_accel_m_s2; and `state`.
@@ -116,17 +116,23 @@ class Actor:
 
 
 def check_layers(layers: Sequence[Layer]) -> None:
-    """Refuse layers that do not lead from an observation to an action.
+    """Refuse layers that do not map an observation to an action.
 
     Raises:
         ConfigError: naming the first layer that does not fit.
     """
     if not layers:
         raise ConfigError("layers: there are none")
+    for index, pair in enumerate(layers):
+        for name, tensor, rank in zip(("weight", "bias"), pair, (2, 1), strict=True):
+            if tensor.dtype != np.float32 or tensor.ndim != rank:
+                raise ConfigError(
+                    f"layers.{index}.{name}: must be float32 of rank {rank}, got {tensor.dtype} {tensor.shape}"
+                )
     widths = [SIZE, *(len(weight) for weight, _ in layers[:-1]), ACTIONS]
     for index, ((weight, bias), (inside, outside)) in enumerate(zip(layers, itertools.pairwise(widths), strict=True)):
         for name, tensor, shape in (("weight", weight, (outside, inside)), ("bias", bias, (outside,))):
-            if tensor.dtype != np.float32 or tensor.shape != shape:
+            if tensor.shape != shape:
                 raise ConfigError(f"layers.{index}.{name}: must be float32 {shape}, got {tensor.dtype} {tensor.shape}")
             if not np.isfinite(tensor).all():
                 raise ConfigError(f"layers.{index}.{name}: must be finite")
@@ -140,18 +146,18 @@ def to_bytes(actor: Actor) -> bytes:
     for index, (weight, bias) in enumerate(actor.layers):
         tensors |= {f"layers.{index}.weight": np.ascontiguousarray(weight), f"layers.{index}.bias": bias}
     content = bytes(save(tensors, {name: str(value) for name, value in asdict(actor.functions).items()}))
-    # The header is JSON behind its length; its metadata come in random order, but equal actors shall make equal files.
+    # The header is JSON after its length; its metadata come in random order, but equal actors must give equal files.
     start, end = 8, 8 + int.from_bytes(content[:8], "little")
     header = json.dumps(json.loads(content[start:end]), sort_keys=True, separators=(",", ":"))
     return content[:start] + header.encode().ljust(end - start) + content[end:]
 
 
 def read_actor(path: Path, scenario: Scenario) -> Actor:
-    """The actor of a safetensors file, which holds numbers and no code.
+    """Read an actor from a safetensors file, which holds numbers and no code.
 
     Args:
         path: of the file.
-        scenario: what it was trained on.
+        scenario: task that it was trained on.
 
     Raises:
         ConfigError: the file is missing, damaged, or holds no actor; one line.
@@ -160,9 +166,17 @@ def read_actor(path: Path, scenario: Scenario) -> Actor:
 
     try:
         with safe_open(path, framework="numpy") as file:
-            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (no mapping)
+            names = list(file.keys())
+            # numpy has no bfloat16 and no float8: look at the types before reading any tensor
+            types = {name: file.get_slice(name).get_dtype() for name in names}
+            for name in names:
+                if types[name] != "F32":
+                    raise ConfigError(f"{path}: {name}: must be float32, got {types[name]}")
+            tensors = {name: file.get_tensor(name) for name in names}
             metadata = file.metadata() or {}
-    except (OSError, SafetensorError) as error:
+    except ConfigError:
+        raise
+    except (OSError, SafetensorError, ValueError, TypeError) as error:
         raise ConfigError(f"{path}: cannot be read: {' '.join(str(error).split())}") from None
     try:
         functions = Functions(
@@ -179,11 +193,11 @@ def read_actor(path: Path, scenario: Scenario) -> Actor:
 
 
 def _layers(tensors: Mapping[str, Array32]) -> list[Layer]:
-    """The layers in their order.
+    """Sort the tensors into layers.
 
     Raises:
         KeyError: one is missing.
-        ConfigError: a tensor is no layer's.
+        ConfigError: a tensor belongs to no layer.
     """
     count = len(tensors) // 2
     layers = [(tensors[f"layers.{index}.weight"], tensors[f"layers.{index}.bias"]) for index in range(count)]

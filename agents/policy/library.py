@@ -1,4 +1,4 @@
-"""Policies that come with the package: their files, their cards, and how they are loaded. No torch, no pickle."""
+"""Shipped policies: their files, their cards, and how they are loaded. No torch, no pickle."""
 
 import hashlib
 import re
@@ -21,10 +21,10 @@ TENSORS, CARD, GRAPH = ".safetensors", ".json", ".onnx"
 
 @settings
 class Interval:
-    """A mean with its 95 % interval.
+    """Mean with its 95 % interval.
 
     Attributes:
-        mean: of the episodes, or of the runs.
+        mean: over the episodes, or over the runs.
         low: lower end.
         high: upper end.
     """
@@ -36,17 +36,17 @@ class Interval:
 
 @settings
 class Trained:
-    """What one training run came to.
+    """Results of a training run.
 
     Attributes:
         seed: of the training.
         steps: environment steps flown.
-        pretraining_s: wall time of what came before the first of them, s; none where it is not known.
-        wall_time_s: of the training from there on, s.
-        validation_cost_m_s: mean cost on the validation seeds, by which the shipped run was chosen, m/s.
-        test_cost_m_s: cost on the test seeds, m/s; nothing was chosen by it.
-        saved_m_s: by how much less that is than the cost of the actor that the run started from, paired by seed, m/s;
-            none where it started from random weights.
+        pretraining_s: wall time of the pretraining, s; none if unknown.
+        wall_time_s: wall time of reinforcement learning, s.
+        validation_cost_m_s: mean cost on the validation seeds, which decided which run is shipped, m/s.
+        test_cost_m_s: cost on the test seeds, m/s; it decided nothing.
+        saved_m_s: reduction of that cost from the actor that the run started from, paired by seed, m/s; none if it
+            started from random weights.
     """
 
     seed: int
@@ -60,20 +60,20 @@ class Trained:
 
 @settings
 class Card:
-    """What stands beside a policy's tensors.
+    """Description of a policy, in a file beside its tensors.
 
     Attributes:
-        algorithm: that trained it.
+        algorithm: name of the training algorithm.
         env: registered id with its version, or a scenario's name or path.
-        observation_size: elements that it reads.
+        observation_size: length of the observation that it reads.
         sha256: of the file of tensors.
         test: metric -> mean and interval on the test seeds, bootstrap over episodes.
-        test_episodes: how many test seeds, from the first on.
-        first_test_costs_m_s: costs on the first of them, m/s, to be flown again.
+        test_episodes: number of test seeds, from the first on.
+        first_test_costs_m_s: costs on the first of them, m/s, for checks.
         cost_over_runs_m_s: mean test cost of all training runs, with Student's interval over runs; none for one run.
         runs: all training runs, the shipped one first.
-        training: the shipped run's settings and versions, as noted by the training.
-        scenario: what it was trained on.
+        training: settings and versions of the shipped run.
+        scenario: task that it was trained on.
     """
 
     algorithm: Text
@@ -90,7 +90,7 @@ class Card:
 
 
 def load_policy(source: str | Path, env: str | None = None) -> Actor:
-    """A learned policy, with the same `predict` as a baseline.
+    """Load a learned policy, with the same `predict` as a baseline.
 
     Args:
         source: the algorithm of a shipped policy, or the path of a .safetensors file with its card beside it.
@@ -108,7 +108,7 @@ def load_policy(source: str | Path, env: str | None = None) -> Actor:
 
 
 def shipped_path(algorithm: str, env: str) -> Path:
-    """The file of a shipped policy.
+    """Path of a shipped policy.
 
     Raises:
         ConfigError: there is none.
@@ -121,51 +121,55 @@ def shipped_path(algorithm: str, env: str) -> Path:
 
 
 def shipped_paths() -> list[Path]:
-    """Files of all shipped policies, by name."""
+    """Paths of all shipped policies, sorted by name."""
     return sorted(SHIPPED.glob(f"*{TENSORS}"))
 
 
 def policy_name(algorithm: str, env: str) -> str:
-    """What a policy's files are called."""
+    """Stem of a policy's files."""
     return f"{algorithm}_{scenario_name(env)}"
 
 
 def scenario_name(env: str) -> str:
-    """The scenario's name, of a registered id, a name or a file."""
+    """Scenario's name for a registered id, a name or a file."""
     return Path(ENV_IDS.get(env, env)).stem
 
 
 def load_with_card(path: Path) -> tuple[Actor, Card]:
-    """A policy and its card, held against each other and against the environment.
+    """Load a policy and its card, and check them against each other and the environment.
 
     Raises:
         ConfigError: one is missing or faulty, or they do not match; one line.
     """
+    digest = _digest_of(path)
     card = read_card(path.with_suffix(CARD))
-    _check_content(path, card)
+    if digest != card.sha256:
+        raise ConfigError(f"{path}: sha256 is {digest[:12]}..., but its card says {card.sha256[:12]}...; do not fly it")
     if card.observation_size != SIZE:
         raise ConfigError(f"{path}: reads {card.observation_size} observations, the environment gives {SIZE}")
     _check_env(path, card)
     return read_actor(path, card.scenario), card
 
 
-def _check_content(path: Path, card: Card) -> None:
-    """Refuse tensors that are not the card's."""
+def _digest_of(path: Path) -> str:
+    """SHA-256 of a file.
+
+    Raises:
+        ConfigError: it cannot be read.
+    """
     try:
-        digest = sha256(path.read_bytes())
+        return sha256(path.read_bytes())
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
-    if digest != card.sha256:
-        raise ConfigError(f"{path}: sha256 is {digest[:12]}..., but its card says {card.sha256[:12]}...; do not fly it")
 
 
 def sha256(content: bytes) -> str:
-    """The hash of a file's content, in hexadecimal digits."""
+    """SHA-256 of a file's content, in hexadecimal digits."""
     return hashlib.sha256(content).hexdigest()
 
 
 def read_card(path: Path) -> Card:
-    """A policy's card.
+    """Read a policy's card.
 
     Raises:
         ConfigError: it is missing or faulty.
@@ -174,9 +178,9 @@ def read_card(path: Path) -> Card:
 
 
 def _check_env(path: Path, card: Card) -> None:
-    """Refuse a policy whose environment is no more what it was trained on; a file of one's own stands in the card."""
+    """Refuse a policy whose environment has changed since its training; a user's own scenario is in the card."""
     if re.fullmatch(r"\w+-v\d+", card.env) and card.env not in ENV_IDS:
-        raise ConfigError(f"{path}: was trained on {card.env}, which is not there; {nearest(card.env, ENV_IDS)}")
+        raise ConfigError(f"{path}: was trained on {card.env}, which does not exist; {nearest(card.env, ENV_IDS)}")
     if card.env not in (*ENV_IDS, *scenario_names()):
         return
     then, now = card.scenario, load_scenario(card.env)

@@ -1,4 +1,4 @@
-"""An actor as an ONNX graph, for runtimes without Python."""
+"""Export of an actor as an ONNX graph, for runtimes without Python."""
 
 from typing import Any, Final
 
@@ -12,7 +12,7 @@ from formation_env.task.observation import SIZE
 
 OPSET: Final = 21
 IR_VERSION: Final = 10
-"""What ONNX runtimes since 2024 read; all operators here are older."""
+"""Understood by ONNX runtimes since 2024; all operators used here are older."""
 ACTIVATIONS: Final = {"tanh": "Tanh", "relu": "Relu", "elu": "Elu"}
 
 
@@ -42,7 +42,7 @@ def to_onnx(actor: Actor) -> bytes:
 
 
 def _begin(actor: Actor) -> tuple[list[Any], list[Any]]:
-    """Nodes and constants from the observation to what the first layer reads, see `agents.policy.features`."""
+    """Nodes and constants from the observation to the first layer's input, see `agents.policy.features`."""
     if actor.functions.magnification == 1:
         return [helper.make_node("Identity", ["observation"], ["features"])], []
     factors = np.ones(SIZE, np.float32)
@@ -57,10 +57,13 @@ def _begin(actor: Actor) -> tuple[list[Any], list[Any]]:
 
 
 def _end(actor: Actor, value: str) -> tuple[list[Any], list[Any]]:
-    """Nodes and constants from the last sum on: squash, then sign(z) |z|^p."""
-    numbers = {"low": -1.0, "high": 1.0, "power": actor.functions.throttle_power}
-    constants = [numpy_helper.from_array(np.float32(number), name) for name, number in numbers.items()]
-    squash = ("Clip", [value, "low", "high"]) if actor.functions.squash == "clip" else ("Tanh", [value])
+    """Nodes and constants after the last layer: squash, then sign(z) |z|^p."""
+    numbers = {"power": actor.functions.throttle_power}
+    squash: tuple[str, list[str]] = ("Tanh", [value])
+    if actor.functions.squash == "clip":
+        squash = ("Clip", [value, "low", "high"])
+        numbers = {"low": -1.0, "high": 1.0} | numbers
+    constants = [numpy_helper.from_array(np.asarray(number, np.float32), name) for name, number in numbers.items()]
     nodes = [
         helper.make_node(*squash, ["z"]),
         helper.make_node("Sign", ["z"], ["sign"]),

@@ -1,1 +1,1 @@
-"""What a policy learns before reinforcement learning: from a classical policy, then from the model's gradient."""
+"""Training before reinforcement learning: imitation of a classical policy, then gradient descent through the model."""

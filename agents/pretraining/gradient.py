@@ -1,8 +1,8 @@
-"""The gradient of an episode's cost through the model, all the way back to a network's weights.
+"""Gradient of an episode's cost with respect to a network's weights, by backpropagation through the model.
 
 With the disturbances of `recording`, state, observation and cost of a whole episode are smooth functions of the
-network's weights, and backpropagation through time gives the cost's gradient. It points the same way as the policy
-gradient of reinforcement learning, but has no noise of exploration in it.
+network's weights. The gradient estimates the same quantity as the policy gradient of reinforcement learning, without
+the noise of exploration.
 """
 
 import math
@@ -19,13 +19,13 @@ from formation_env.task.observation import LOG_RANGE, LOG_UNIT_POS_M, LOG_UNIT_V
 from formation_env.task.schedule import build_schedule, coast_matrices, column, columns
 
 SMOOTH_M: Final = 1e-2
-"""Errors below this are not told from zero; the root has no gradient there."""
+"""Smoothing of the position error's norm near zero, where the root has no gradient, m."""
 SMOOTH_THROTTLE: Final = 1e-5
-"""The same for thrusts, in units of the greatest."""
+"""Smoothing of the thrust's norm near zero, in units of the maximum thrust."""
 
 
 class ModelEpisodes:
-    """Recorded episodes that a network can be flown through, and differentiated.
+    """Recorded episodes as a differentiable simulation of a network's flight.
 
     Legend: x true state, x_hat estimate, r reference; Phi, Gamma, delta the true model; A, b the coast to the arrival.
     """
@@ -48,7 +48,7 @@ class ModelEpisodes:
         matrices = np.concatenate([np.broadcast_to(np.eye(6), A.shape), A], axis=1) / unit[:, None]
         self._both, self._offset = _tensor(matrices.swapaxes(1, 2)), _tensor(np.concatenate([-r, b], axis=1) / unit)
         self._linear = _tensor(magnification * unit / np.tile(observation_layout(scenario).state_scale, 2))
-        self._price, self._scored = (
+        self._error_weight, self._scored_position = (
             _tensor(column(table, "error_weight")),
             _tensor(columns(table, "scored_position")),
         )
@@ -56,12 +56,12 @@ class ModelEpisodes:
         self._rest = _tensor(recording.rest)
 
     def cost(self, network: nn.Module, throttle_power: float, rows: Any) -> Tensor:
-        """Mean cost of some rows' episodes, m/s: minus the environment's return.
+        """Mean cost of the episodes of some rows, m/s: minus the environment's return.
 
         Args:
             network: from features (rows, SIZE) to throttles before the tanh (rows, 3).
-            throttle_power: p of the thrust that a throttle stands for.
-            rows: which, any index of tensors.
+            throttle_power: p of the thrust sign(z) |z|^p for a throttle z.
+            rows: which episodes, any index of tensors.
         """
         x, pushes, errors, rest = self._starts[rows], self._pushes[:, rows], self._errors[:, rows], self._rest[:, rows]
         actions, positions = list[Tensor](), list[Tensor]()
@@ -72,27 +72,26 @@ class ModelEpisodes:
             actions.append(action)
             positions.append(x[:, :3])
         impulse = self._scenario.spacecraft.max_accel_m_s2 * self._scenario.dt_s
-        misses = torch.stack(positions) - self._scored[1:, None]
+        misses = torch.stack(positions) - self._scored_position[1:, None]
         return impulse * _norm(torch.stack(actions), SMOOTH_THROTTLE).mean(dim=1).sum() + (
-            self._price[1:] @ self._judged(misses).mean(dim=1)
+            self._error_weight[1:] @ self._error_cost(misses).mean(dim=1)
         )
 
-    def _judged(self, misses: Tensor) -> Tensor:
-        """What the reward counts of position errors (..., 3), m."""
-        reward = self._scenario.reward
-        if reward.error_cost == "quadratic":
-            return (misses**2).sum(dim=-1) / reward.quadratic_scale_m
-        return _norm(misses, SMOOTH_M)
+    def _error_cost(self, misses: Tensor) -> Tensor:
+        """Cost (...) of position errors (..., 3), m, per unit of their weight, smooth at zero."""
+        cost = self._scenario.reward.cost()
+        total = cost.linear * _norm(misses, SMOOTH_M) if cost.linear else torch.zeros(misses.shape[:-1])
+        return total + cost.quadratic * (misses**2).sum(dim=-1) if cost.quadratic else total
 
     def _features(self, step: int, x_hat: Tensor, rest: Tensor) -> Tensor:
-        """What the network reads (rows, SIZE), as the environment and `agents.policy.features` make it."""
+        """Network input (rows, SIZE), as the environment and `agents.policy.features` form it."""
         both = torch.addmm(self._offset[step], x_hat, self._both[step])
         logs = both.sign() * torch.log1p(both.abs()) / math.log1p(LOG_RANGE)
         return torch.cat([both * self._linear, logs, rest], dim=1).clamp(-CUT, CUT)
 
 
 def _norm(vectors: Tensor, smooth: float) -> Tensor:
-    """|v| of (..., n), with a gradient at zero, too."""
+    """Smoothed norm of vectors (..., n), differentiable at zero."""
     return torch.sqrt((vectors**2).sum(dim=-1) + smooth**2) - smooth
 
 

@@ -1,6 +1,7 @@
-"""Behaviour cloning of a classical policy, on what the clone itself sees (DAgger, Ross et al. 2011)."""
+"""Behaviour cloning of a classical policy on the states that the clone visits (DAgger, Ross et al. 2011)."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -16,48 +17,62 @@ from formation_env.task.scenario import Scenario
 
 Array32 = NDArray[np.float32]
 BATCH: Final = 512
+"""Samples of a gradient step."""
 EPOCHS: Final = 3
+"""Passes over all samples after each round."""
 LEARNING_RATE: Final = 2e-3
-"""At the first round; it falls to a twentieth."""
+"""Initial value; it falls linearly to `LAST_SHARE` of that."""
+LAST_SHARE: Final = 0.05
 THRUST_WEIGHT: Final = 5.0
-"""Of errors of the thrust over errors of the throttle, which count most near coasting."""
-_SHAKE: Final = 0.5
-"""Share of its thrust by which the teacher is shaken on the first flight, so that it shows how it recovers."""
+"""Weight of the thrust's error relative to the throttle's, which is the larger one near coasting."""
+TEACHER_NOISE: Final = 0.5
+"""Standard deviation of the noise on the teacher's thrust in the first round, relative to that thrust, so that the
+samples contain recoveries from deviations."""
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """Task of an imitation.
+
+    Attributes:
+        teacher: policy to imitate.
+        scenario: task that is flown.
+        throttle_power: p of the thrust sign(z) |z|^p for a throttle z.
+        magnification: factor of the errors in the features.
+    """
+
+    teacher: Policy
+    scenario: Scenario
+    throttle_power: float
+    magnification: float
 
 
 def imitate(
     network: nn.Module,
-    throttle_power: float,
-    teacher: Policy,
-    scenario: Scenario,
+    lesson: Lesson,
     rounds: Sequence[Sequence[int]],
-    magnification: float,
     generator: np.random.Generator,
     progress: Callable[[int], Any] = lambda count: None,
 ) -> None:
-    """Fit a network to a teacher's actions. The first round is flown by the teacher, the others by the network.
+    """Fit a network to a teacher's actions. The teacher flies the first round, the network all others.
 
     Args:
         network: from features (rows, SIZE) to throttles before the tanh (rows, 3); fitted in place.
-        throttle_power: p of the thrust that a throttle stands for.
-        teacher: whose actions are the goal.
-        scenario: what is flown.
+        lesson: teacher and task.
         rounds: seeds of each round's episodes.
-        magnification: of the features.
-        generator: of the shaking and of the order of samples.
+        generator: of the teacher's noise and of the order of samples.
         progress: called with 1 after each round.
     """
     optimizer = torch.optim.Adam(network.parameters(), LEARNING_RATE)
-    schedule = torch.optim.lr_scheduler.LinearLR(optimizer, 1.0, 0.05, len(rounds) * EPOCHS)
-    seen, wanted = list[Tensor](), list[Tensor]()
+    schedule = torch.optim.lr_scheduler.LinearLR(optimizer, 1.0, LAST_SHARE, len(rounds) * EPOCHS)
+    features_seen, teacher_actions = list[Tensor](), list[Tensor]()
     for index, seeds in enumerate(rounds):
-        flown_by = None if index == 0 else network
-        for shown, action in _fly(flown_by, throttle_power, teacher, scenario, seeds, magnification, generator):
-            seen.append(shown)
-            wanted.append(action)
-        inputs, actions = torch.cat(seen), torch.cat(wanted)
+        for inputs, actions in _fly(None if index == 0 else network, lesson, seeds, generator):
+            features_seen.append(inputs)
+            teacher_actions.append(actions)
+        all_inputs, all_actions = torch.cat(features_seen), torch.cat(teacher_actions)
         for _ in range(EPOCHS):
-            _fit(network, throttle_power, optimizer, inputs, actions, generator)
+            _fit(network, lesson.throttle_power, optimizer, (all_inputs, all_actions), generator)
             schedule.step()
         progress(1)
 
@@ -66,13 +81,13 @@ def _fit(
     network: nn.Module,
     throttle_power: float,
     optimizer: torch.optim.Optimizer,
-    inputs: Tensor,
-    actions: Tensor,
+    samples: tuple[Tensor, Tensor],
     generator: np.random.Generator,
 ) -> None:
-    """One pass over the samples."""
+    """One pass over the samples: features and the teacher's actions."""
+    inputs, actions = samples
     throttles = actions.sign() * actions.abs() ** (1 / throttle_power)
-    for rows in torch.as_tensor(generator.permutation(len(inputs))).split(BATCH):
+    for rows in torch.split(torch.as_tensor(generator.permutation(len(inputs))), BATCH):
         z = network(inputs[rows]).tanh()
         loss = ((z - throttles[rows]) ** 2).mean()
         loss = loss + THRUST_WEIGHT * ((thrust_of(z, throttle_power) - actions[rows]) ** 2).mean()
@@ -82,25 +97,19 @@ def _fit(
 
 
 def _fly(
-    network: nn.Module | None,
-    throttle_power: float,
-    teacher: Policy,
-    scenario: Scenario,
-    seeds: Sequence[int],
-    magnification: float,
-    generator: np.random.Generator,
+    network: nn.Module | None, lesson: Lesson, seeds: Sequence[int], generator: np.random.Generator
 ) -> list[tuple[Tensor, Tensor]]:
-    """Features seen at each step, and the teacher's actions there; flown by the network, or by the shaken teacher."""
-    env, samples = FormationVectorEnv(len(seeds), scenario), []
+    """Features at each step and the teacher's actions there; without a network the noisy teacher flies."""
+    env, samples = FormationVectorEnv(len(seeds), lesson.scenario), []
     observations, _ = env.reset(seed=list(seeds))
-    for _ in range(scenario.num_steps):
-        shown = torch.as_tensor(features(observations, magnification))
-        wanted: Array32 = teacher.predict(observations)[0]
-        samples.append((shown, torch.as_tensor(wanted)))
+    for _ in range(lesson.scenario.num_steps):
+        inputs = torch.as_tensor(features(observations, lesson.magnification))
+        taught: Array32 = lesson.teacher.predict(observations)[0]
+        samples.append((inputs, torch.as_tensor(taught)))
         if network is None:
-            flown = wanted + _SHAKE * np.abs(wanted) * generator.standard_normal(wanted.shape, np.float32)
+            flown = taught + TEACHER_NOISE * np.abs(taught) * generator.standard_normal(taught.shape, np.float32)
         else:
             with torch.no_grad():
-                flown = thrust_of(network(shown).tanh(), throttle_power).numpy()
+                flown = thrust_of(network(inputs).tanh(), lesson.throttle_power).numpy()
         observations = env.step(np.clip(flown, -1, 1))[0]
     return samples

@@ -1,4 +1,4 @@
-"""From a scenario to an actor that flies it, without reinforcement learning: a clone, improved by the gradient."""
+"""Pretraining of an actor: imitation of a classical policy, then gradient descent through the model."""
 
 import copy
 import itertools
@@ -10,79 +10,102 @@ import numpy as np
 import torch
 from torch import nn
 
-from agents.algorithms.models import ACTIVATIONS
+from agents.algorithms.throttle_policy import ACTIVATIONS
 from agents.hyperparameters import Network, Pretraining
-from agents.policy.actor import Actor, Functions
+from agents.policy.actor import ACTIONS, Actor, Functions
 from agents.pretraining.gradient import ModelEpisodes
-from agents.pretraining.imitation import imitate
-from agents.pretraining.recording import record_disturbances
+from agents.pretraining.imitation import Lesson, imitate
+from agents.pretraining.recording import check_separation, record_disturbances
 from baselines import make_policy
 from formation_env.evaluation.rollout import evaluate
 from formation_env.evaluation.seeds import seeds
+from formation_env.settings import ConfigError
 from formation_env.task.observation import SIZE
 from formation_env.task.scenario import Scenario
 from formation_env.task.variants import draw_variants
 
-UPDATES_A_JUDGEMENT: Final = 50
-"""After so many the network flies the validation seeds; the best one is kept."""
-_WARM_UP: Final = 20
+UPDATES_PER_VALIDATION: Final = 50
+"""Updates between validations; the best network is kept, since the cost still fluctuates at high learning rates."""
+_WARM_UP_UPDATES: Final = 20
+"""Updates over which the learning rate rises from zero: Muon's momentum averages over about as many."""
+_LAST_SHARE: Final = 0.01
+"""Final learning rate over the peak value: the last updates average out the noise of the batches."""
 _MAX_NORM: Final = 1.0
+"""Gradients are clipped to this norm; typical ones are below 0.1, those of an unstable closed loop far above."""
 _FIRST_SEED: Final = 500_000
-"""Of the training split: far behind those that reinforcement learning begins with."""
+"""Offset in the training split, far behind the seeds with which reinforcement learning begins."""
 _FIRST_OUTPUT: Final = 0.1
-"""Factor of the last layer's first weights: a new network hardly thrusts."""
+"""Factor of the last layer's initial weights: a new network hardly thrusts."""
 
 
 def pretrain(
-    how: Pretraining,
+    settings: Pretraining,
     network: Network,
     functions: Functions,
     scenario: Scenario,
+    *,
     seed: int,
-    validation_episodes: int = 64,
-    progress: Callable[[str, float], Any] = lambda done, cost: None,
+    validation_episodes: int,
+    progress: Callable[[str, float], Any] = lambda stage, cost: None,
 ) -> Actor:
-    """The actor of least validation cost on the way.
+    """Train an actor without reinforcement learning; the best one on the validation seeds is kept.
 
     Args:
-        how: what is done.
-        network: its layers.
-        functions: what stands between and behind them.
-        scenario: what is flown.
-        seed: of weights, samples and episodes.
-        validation_episodes: on which the best is chosen.
-        progress: told what has just been done, and the mean validation cost that it came to, m/s.
+        settings: effort of imitation and gradient descent.
+        network: layers.
+        functions: functions between and after the layers.
+        scenario: task that is flown.
+        seed: of initial weights, samples and episodes.
+        validation_episodes: episodes on which the best network is chosen.
+        progress: called with the stage that has ended and the mean validation cost after it, m/s.
 
     Raises:
-        ConfigError: no teacher of that name, or a nonlinear truth where the gradient is wanted.
+        ConfigError: no teacher of that name, or `check_pretraining` fails.
     """
+    check_pretraining(settings, scenario, seed)
     generator, power = np.random.default_rng(seed), functions.throttle_power
     net = _network(network, seed)
-    episodes = _training_seeds(how, seed)
-    best, least = copy.deepcopy(net), math.inf
+    episodes = _training_seeds(settings, seed)
+    best, lowest = copy.deepcopy(net), math.inf
 
-    def judge(text: str) -> None:
-        nonlocal best, least
+    def validate(stage: str) -> None:
+        nonlocal best, lowest
         actor = _actor(net, functions, scenario)
         cost = -float(evaluate(actor, scenario, seeds("validation", validation_episodes))["return"].mean())
-        progress(text, cost)
-        if cost < least:
-            best, least = copy.deepcopy(net), cost
+        progress(stage, cost)
+        if cost < lowest:
+            best, lowest = copy.deepcopy(net), cost
 
-    models = _models(how, functions, scenario, episodes[how.rows * how.rounds :]) if how.updates else []
-    if how.rounds:
-        teacher = make_policy(how.teacher, scenario)
-        rounds = [episodes[how.rows * i : how.rows * (i + 1)] for i in range(how.rounds)]
-        imitate(net, power, teacher, scenario, rounds, functions.magnification, generator)
-        judge(f"after imitating {how.teacher}")
+    recorded = episodes[settings.rows * settings.rounds :]
+    models = _models(settings, functions, scenario, recorded) if settings.updates else []
+    if settings.rounds:
+        teacher = make_policy(settings.teacher, scenario)
+        rounds = [episodes[settings.rows * i : settings.rows * (i + 1)] for i in range(settings.rounds)]
+        imitate(net, Lesson(teacher, scenario, power, functions.magnification), rounds, generator)
+        validate(f"after imitating {settings.teacher}")
     if models:
-        descend(net, power, models, how, generator, judge)
+        descend(net, power, models, settings, generator, validate)
     return _actor(best, functions, scenario)
 
 
-def _models(how: Pretraining, functions: Functions, scenario: Scenario, recorded: range) -> list[ModelEpisodes]:
-    """Recorded episodes, evenly shared among the scenario's variants."""
-    variants = draw_variants(scenario)[: how.episodes]
+def check_pretraining(settings: Pretraining, scenario: Scenario, seed: int) -> None:
+    """Refuse a pretraining that would fail or mislead later, before any work is done.
+
+    Raises:
+        ConfigError: too few training seeds, or, if the gradient is used, disturbances that depend on the thrust.
+    """
+    try:
+        _training_seeds(settings, seed)
+    except ValueError:
+        raise ConfigError(f"seed: no training seeds are left for pretraining, got {seed}") from None
+    if settings.updates:
+        for variant in draw_variants(scenario):
+            check_separation(variant)
+
+
+def _models(settings: Pretraining, functions: Functions, scenario: Scenario, recorded: range) -> list[ModelEpisodes]:
+    """Recorded episodes, evenly distributed among the scenario's variants."""
+    variants = draw_variants(scenario)[: settings.episodes]
     return [
         ModelEpisodes(record_disturbances(variant, recorded[k :: len(variants)]), functions.magnification)
         for k, variant in enumerate(variants)
@@ -93,41 +116,42 @@ def descend(
     net: nn.Module,
     throttle_power: float,
     models: Sequence[ModelEpisodes],
-    how: Pretraining,
+    settings: Pretraining,
     generator: np.random.Generator,
-    judge: Callable[[str], Any],
+    validate: Callable[[str], Any],
 ) -> None:
-    """Follow the cost's gradient through the model.
+    """Minimise the mean cost by gradient descent through the model.
 
     Args:
         net: from features to outputs; changed in place.
-        throttle_power: p of the thrust sign(z) |z|^p that the outputs' z = tanh stands for.
-        models: the episodes of each variant of the scenario; each update takes those of one.
-        how: how many updates, of which size.
-        generator: chooses the episodes of each.
-        judge: called with a text from time to time, and at the end.
+        throttle_power: p of the thrust sign(z) |z|^p for z = tanh(output).
+        models: episodes of each variant of the scenario; each update uses those of one.
+        settings: number and size of the updates.
+        generator: chooses the episodes of each update.
+        validate: called with a text every `UPDATES_PER_VALIDATION` updates and at the end.
     """
-    optimizers = _optimizers(net, how.learning_rate)
+    optimizers = _optimizers(net, settings.learning_rate)
     schedules = [
-        torch.optim.lr_scheduler.LambdaLR(optimizer, lambda k: _share(k, how.updates)) for optimizer in optimizers
+        torch.optim.lr_scheduler.LambdaLR(optimizer, lambda k: _learning_rate_share(k, settings.updates))
+        for optimizer in optimizers
     ]
-    for update in range(1, how.updates + 1):
-        model = models[generator.integers(len(models))]
-        rows = torch.as_tensor(generator.choice(model.rows, min(how.batch, model.rows), replace=False))
+    for update in range(1, settings.updates + 1):
+        model = models[int(generator.integers(len(models)))]
+        rows = torch.as_tensor(generator.choice(model.rows, min(settings.batch, model.rows), replace=False))
         net.zero_grad()
-        model.cost(net, throttle_power, rows).backward()
+        model.cost(net, throttle_power, rows).backward()  # type: ignore[no-untyped-call] # torch leaves it untyped
         nn.utils.clip_grad_norm_(net.parameters(), _MAX_NORM)
         for optimizer, schedule in zip(optimizers, schedules, strict=True):
             optimizer.step()
             schedule.step()
-        if update % UPDATES_A_JUDGEMENT == 0 or update == how.updates:
-            judge(f"after {update} updates through the model")
+        if update % UPDATES_PER_VALIDATION == 0 or update == settings.updates:
+            validate(f"after {update} updates through the model")
 
 
 def _optimizers(net: nn.Module, learning_rate: float) -> list[torch.optim.Optimizer]:
-    """Muon (Jordan et al. 2024) for weights: it gives all directions of a matrix the same step, the weak ones, too.
+    """Muon (Jordan et al. 2024) for weights: all directions of a matrix get the same step size, weak ones included.
 
-    It has no rule for biases, which Adam takes.
+    It has no rule for biases, for which Adam is used.
     """
     weights = [part for part in net.parameters() if part.ndim > 1]
     biases = [part for part in net.parameters() if part.ndim == 1]
@@ -135,19 +159,20 @@ def _optimizers(net: nn.Module, learning_rate: float) -> list[torch.optim.Optimi
     return [muon, torch.optim.Adam(biases, learning_rate)]
 
 
-def _share(update: int, updates: int) -> float:
-    """Of the greatest learning rate: up within `_WARM_UP` updates, then down to nearly nothing with the cosine."""
-    return min(1.0, (update + 1) / _WARM_UP) * (0.505 + 0.495 * math.cos(math.pi * update / updates))
+def _learning_rate_share(update: int, updates: int) -> float:
+    """Learning rate over its peak value: a linear rise, times a cosine decay from 1 to `_LAST_SHARE`."""
+    middle, half = (1 + _LAST_SHARE) / 2, (1 - _LAST_SHARE) / 2
+    return min(1.0, (update + 1) / _WARM_UP_UPDATES) * (middle + half * math.cos(math.pi * update / updates))
 
 
 def _network(network: Network, seed: int) -> nn.Sequential:
-    """A new network from features to outputs."""
+    """Build a network from features to outputs."""
     widths, layers = [SIZE, *network.hidden], list[nn.Module]()
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         for inside, outside in itertools.pairwise(widths):
             layers += [nn.Linear(inside, outside), ACTIVATIONS[network.activation]()]
-        last = nn.Linear(widths[-1], 3)
+        last = nn.Linear(widths[-1], ACTIONS)
     with torch.no_grad():
         last.weight.mul_(_FIRST_OUTPUT)
         last.bias.zero_()
@@ -155,13 +180,17 @@ def _network(network: Network, seed: int) -> nn.Sequential:
 
 
 def _actor(net: nn.Sequential, functions: Functions, scenario: Scenario) -> Actor:
-    """The network as it is now, without torch."""
+    """Copy the network's present state into an actor."""
     linear = [layer for layer in net if isinstance(layer, nn.Linear)]
     layers = [(layer.weight.detach().numpy().copy(), layer.bias.detach().numpy().copy()) for layer in linear]
     return Actor(layers, functions, scenario)
 
 
-def _training_seeds(how: Pretraining, seed: int) -> range:
-    """Episodes of imitation and, behind them, of the gradient; others for each seed."""
-    count = how.rows * how.rounds + how.episodes
+def _training_seeds(settings: Pretraining, seed: int) -> range:
+    """Seeds of imitation and, after them, of the recorded episodes; different for each seed of a run.
+
+    Raises:
+        ValueError: there are not so many.
+    """
+    count = settings.training_episodes
     return seeds("training", _FIRST_SEED + (seed + 1) * count)[-count:]

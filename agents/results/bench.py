@@ -1,10 +1,11 @@
-"""How fast PPO learns on the batched environment, and how much of that time the environment takes."""
+"""Training speed of PPO on the batched environment, and the environment's share of the time."""
 
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import torch
 from numpy.typing import NDArray
@@ -12,18 +13,18 @@ from stable_baselines3.common.vec_env import VecEnvWrapper
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from agents.algorithms.models import make_env, make_model
-from agents.hyperparameters import PPOSettings
+from agents.algorithms.ppo import PPOSettings
 from formation_env.task.loading import load_scenario
 
 
 @dataclass(frozen=True)
 class Speed:
-    """Of one rollout and the update on it.
+    """Speed of one rollout and the update on it.
 
     Attributes:
-        steps_per_s: environment steps, by the clock on the wall.
-        steps_per_cpu_s: by the processor time of all threads, which other programs do not take.
-        env_share: of the wall time, that the environment and its adapter take.
+        steps_per_s: environment steps per second of wall time.
+        steps_per_cpu_s: environment steps per second of processor time of all threads; independent of other programs.
+        env_share: share of the wall time that the environment and its adapter take.
     """
 
     steps_per_s: float
@@ -32,17 +33,19 @@ class Speed:
 
 
 class TimedVecEnv(VecEnvWrapper):
-    """Adds up the time that steps take.
+    """Wrapper that measures the time that steps take.
 
     Attributes:
-        seconds: up to now.
+        seconds: total since the last reset of this counter, s.
     """
 
     seconds: float = 0.0
 
     def reset(self) -> NDArray[Any]:
         """Begin an episode in all rows; not timed."""
-        return self.venv.reset()
+        observations = self.venv.reset()
+        assert isinstance(observations, np.ndarray), "the environment's observations are one array"
+        return observations
 
     def step(self, actions: NDArray[Any]) -> VecEnvStepReturn:
         """Fly one step in all rows."""
@@ -57,13 +60,13 @@ class TimedVecEnv(VecEnvWrapper):
 
 
 def measure(agent: PPOSettings, env_id: str, threads: int, rounds: int) -> list[Speed]:
-    """Train for some rounds, each a rollout and the update on it, after one that is not counted.
+    """Train for some rounds, each a rollout and the update on it, after an untimed one.
 
     Args:
-        agent: how.
+        agent: hyperparameters.
         env_id: a registered id, or a scenario's name or path.
-        threads: of torch.
-        rounds: how many.
+        threads: threads of torch.
+        rounds: number of rounds.
 
     Returns:
         The speed of each round.
@@ -83,7 +86,7 @@ def measure(agent: PPOSettings, env_id: str, threads: int, rounds: int) -> list[
 
 
 def table(env_id: str, threads: Sequence[int], rounds: int) -> str:
-    """Speeds of PPO with its default settings, the fastest round for each number of torch's threads."""
+    """Table of PPO's speed with its default settings: the fastest round for each number of threads."""
     agent, lines = PPOSettings(), []
     for count in threads:
         best = max(measure(agent, env_id, count, rounds), key=lambda speed: speed.steps_per_s)

@@ -1,4 +1,4 @@
-"""Pictures of learning curves: what runs cost on the validation seeds, against the time that they took."""
+"""Plots of learning curves: validation cost over wall time."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from agents.hyperparameters import ALGORITHMS
+from agents.algorithms.registry import ALGORITHMS
 from agents.policy.library import scenario_name
 from agents.results.evaluate import least_costs
 from agents.training.run_folder import Run, load_run, read_curve, read_pretraining
@@ -23,20 +23,20 @@ from formation_env.files import replacing
 from formation_env.settings import ConfigError
 
 DASHES: Final = {"solid": "-", "dash": "--", "dot": ":", "dashdot": "-."}
-"""The report's dashes, as matplotlib calls them."""
+"""The report's dashes under matplotlib's names."""
 PRETRAINING: Final = "#333333"
-"""Colour of what all algorithms have in common."""
+"""Colour of the pretraining, which all algorithms share."""
 
 
 @dataclass(frozen=True)
-class Learnt:
-    """A run, and how it went.
+class TrainingCurve:
+    """Learning curve of a run.
 
     Attributes:
         folder: of the run.
         run: its settings.
-        pretraining: its judgements, if they are known.
-        curve: its validations.
+        pretraining: validations during pretraining; None if there is no log.
+        curve: validations during reinforcement learning.
     """
 
     folder: Path
@@ -46,16 +46,16 @@ class Learnt:
 
     @property
     def name(self) -> str:
-        """Of what was flown: the scenario's."""
+        """Name of the scenario."""
         return scenario_name(self.run.env)
 
 
 @dataclass(frozen=True)
 class Levels:
-    """What others cost on the same validation seeds.
+    """Reference costs on the same validation seeds.
 
     Attributes:
-        bound: the mean of the least costs, m/s; None where it is not known.
+        bound: mean perfect-information bound, m/s; None if unknown.
         classical: mean cost of classical policies by name, m/s.
     """
 
@@ -64,13 +64,13 @@ class Levels:
 
 
 def draw(folders: Sequence[Path], out: Path, baselines: Sequence[str], bounds: Path) -> list[Path]:
-    """Draw the curves of runs, one picture for each environment: a thin line for each run, levels of the others.
+    """Plot learning curves, one picture per environment: a thin line per run, and levels of reference policies.
 
     Args:
         folders: of the runs, of any algorithms, environments and seeds.
         out: folder of the pictures, learning_ENVIRONMENT.png; made if it does not exist.
         baselines: names of classical policies, flown on the same validation seeds.
-        bounds: folder that keeps the bounds of these seeds.
+        bounds: folder of the cached bounds of these seeds.
 
     Returns:
         Paths of the pictures.
@@ -89,26 +89,26 @@ def draw(folders: Sequence[Path], out: Path, baselines: Sequence[str], bounds: P
     return pictures
 
 
-def by_environment(folders: Sequence[Path]) -> dict[str, list[Learnt]]:
-    """The runs of each environment.
+def by_environment(folders: Sequence[Path]) -> dict[str, list[TrainingCurve]]:
+    """Group runs by environment.
 
     Raises:
-        ConfigError: two of them were not validated on the same episodes.
+        ConfigError: two of a group were not validated on the same episodes.
     """
-    found: dict[str, list[Learnt]] = {}
+    groups: dict[str, list[TrainingCurve]] = {}
     for folder in folders:
-        learnt = Learnt(folder, load_run(folder), read_pretraining(folder), read_curve(folder))
-        first = found.setdefault(learnt.name, [learnt])[0]
+        item = TrainingCurve(folder, load_run(folder), read_pretraining(folder), read_curve(folder))
+        first = groups.setdefault(item.name, [item])[0]
         for key in ("scenario", "validation_episodes"):
-            if getattr(learnt.run, key) != getattr(first.run, key):
-                raise ConfigError(f"{folder}: {key}: is another than that of {first.folder}; draw it apart")
-        if learnt is not first:
-            found[learnt.name].append(learnt)
-    return found
+            if getattr(item.run, key) != getattr(first.run, key):
+                raise ConfigError(f"{folder}: {key}: differs from that of {first.folder}; plot it separately")
+        if item is not first:
+            groups[item.name].append(item)
+    return groups
 
 
 def levels_of(run: Run, baselines: Sequence[str], bounds: Path) -> Levels:
-    """The levels on a run's validation seeds."""
+    """Reference costs on a run's validation seeds."""
     classical = {
         name: -validate(make_policy(name, run.scenario), run.scenario, run.validation_episodes)["return"]
         for name in baselines
@@ -117,16 +117,16 @@ def levels_of(run: Run, baselines: Sequence[str], bounds: Path) -> Levels:
     return Levels(None if least is None else float(least.mean()), classical)
 
 
-def figure_of(runs: Sequence[Learnt], levels: Levels) -> Figure:
-    """Pretraining on the left, if any run knows of it, and what came then on the right."""
+def figure_of(runs: Sequence[TrainingCurve], levels: Levels) -> Figure:
+    """Figure with pretraining on the left, if any run has its log, and reinforcement learning on the right."""
     figure = Figure(figsize=(8.0, 4.8), layout="constrained")
-    known = [learnt.pretraining for learnt in runs if learnt.pretraining is not None]
+    known = [item.pretraining for item in runs if item.pretraining is not None]
     parts: list[Axes] = list(figure.subplots(1, 2 if known else 1, sharey=True, squeeze=False)[0])
     floor = levels.bound or 0.0
-    for judgements in known:
-        _plot(parts[0], judgements, floor, PRETRAINING)
-    for algorithm in (name for name in ALGORITHMS if any(learnt.run.algorithm == name for learnt in runs)):
-        _plot_runs(parts[-1], [learnt for learnt in runs if learnt.run.algorithm == algorithm], floor)
+    for log in known:
+        _plot(parts[0], log, floor, PRETRAINING)
+    for algorithm in (name for name in ALGORITHMS if any(item.run.algorithm == name for item in runs)):
+        _plot_runs(parts[-1], [item for item in runs if item.run.algorithm == algorithm], floor)
     for name, look in looks(levels.classical).items():
         for axes in parts:
             level = levels.classical[name]
@@ -136,23 +136,23 @@ def figure_of(runs: Sequence[Learnt], levels: Levels) -> Figure:
     return figure
 
 
-def _plot_runs(axes: Axes, runs: Sequence[Learnt], floor: float) -> None:
-    """The lines of one algorithm's runs; the first stands in the legend for all."""
+def _plot_runs(axes: Axes, runs: Sequence[TrainingCurve], floor: float) -> None:
+    """Plot the runs of one algorithm; the first has the legend entry."""
     algorithm, steps = runs[0].run.algorithm, runs[0].run.steps
-    best = min(-learnt.curve["return"].max() for learnt in runs)
-    lines = [_plot(axes, learnt.curve, floor, looks(ALGORITHMS)[algorithm].color) for learnt in runs]
+    best = min(-item.curve["return"].max() for item in runs)
+    lines = [_plot(axes, item.curve, floor, looks(ALGORITHMS)[algorithm].color) for item in runs]
     lines[0].set_label(f"{algorithm}, {len(runs)} × {steps:,} steps, best {best:.4g} m/s")
 
 
 def _plot(axes: Axes, table: pd.DataFrame, floor: float, color: str) -> Line2D:
-    """Cost above the floor, m/s, over minutes."""
+    """Plot cost above the floor, m/s, over minutes."""
     (line,) = axes.plot(table["seconds"] / 60, -table["return"] - floor, color=color, linewidth=0.9)
     line.set(marker=".", markersize=3)
     return line
 
 
 def _describe(figure: Figure, parts: Sequence[Axes], run: Run, levels: Levels) -> None:
-    """Quantities and units, and a legend below, where it hides nothing."""
+    """Label the axes, and place the legend below them."""
     for axes, what in zip(parts[::-1], ("reinforcement learning", "pretraining"), strict=False):
         axes.set_yscale("log")
         low, high = axes.get_ylim()

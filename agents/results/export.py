@@ -1,4 +1,4 @@
-"""From training runs to a policy's files: choose on validation seeds, judge once on test seeds, write all at once."""
+"""Export of the best training run as a policy's files: chosen on validation seeds, then tested on test seeds."""
 
 import itertools
 import json
@@ -23,21 +23,25 @@ from formation_env.settings import ConfigError
 from formation_env.task.observation import SIZE
 
 VALIDATION_EPISODES: Final = 500
-"""More than a training flies: the best of many validations looks better than it is."""
+"""More than in a training: the best of many validations is biased upwards on the episodes that chose it."""
 TEST_EPISODES: Final = 100
-FIRST: Final = 5
-"""Test episodes whose costs the card has one by one."""
+LISTED_EPISODES: Final = 5
+"""Test episodes whose costs the card lists one by one."""
+
+
+TWO_SIDED_95: Final = 0.975
+"""Quantile of a two-sided 95 % interval."""
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A run that may be shipped.
+    """Run that may be shipped.
 
     Attributes:
-        run: its settings.
-        actor: its best policy.
-        trained: what it came to.
-        episodes: its test episodes.
+        run: settings.
+        actor: best policy.
+        trained: results.
+        episodes: test episodes.
     """
 
     run: Run
@@ -47,10 +51,10 @@ class Candidate:
 
 
 def export(folders: Sequence[Path], out: Path) -> Path:
-    """Write the tensors, the card and the graph of the run that is best on the validation seeds.
+    """Write tensors, card and graph of the run with the lowest cost on the validation seeds.
 
     Args:
-        folders: of runs of one algorithm on one environment, each with a training seed of its own.
+        folders: of runs of one algorithm on one environment, with different training seeds.
         out: folder of the files; made if it does not exist. Files of the same name are replaced.
 
     Returns:
@@ -58,9 +62,9 @@ def export(folders: Sequence[Path], out: Path) -> Path:
 
     Raises:
         ConfigError: a faulty run, or runs that do not belong together; one line.
-        OSError: the folder cannot be written; nothing in it has changed then.
+        OSError: the folder cannot be written; its files are unchanged then.
     """
-    candidates = [_examine(*opened) for opened in _open(folders)]
+    candidates = [_test(*opened) for opened in _open(folders)]
     candidates.sort(key=lambda candidate: candidate.trained.validation_cost_m_s)
     best = candidates[0]
     tensors = to_bytes(best.actor)
@@ -73,23 +77,23 @@ def export(folders: Sequence[Path], out: Path) -> Path:
 
 
 def _open(folders: Sequence[Path]) -> list[tuple[Path, Run, Actor]]:
-    """The folders, with their runs and these's best policies.
+    """Folders with their runs and best policies.
 
     Raises:
-        ConfigError: two differ in more than their seeds, or not even in these.
+        ConfigError: two runs differ in more than their seeds, or have equal seeds.
     """
     opened = [(folder, *load_best(folder)) for folder in folders]
     for (one, run, _), (other, another, _) in itertools.combinations(opened, 2):
         if (run.algorithm, run.env, run.scenario) != (another.algorithm, another.env, another.scenario):
-            theirs, ours = f"{another.algorithm} on {another.env}", f"{run.algorithm} on {run.env}"
-            raise ConfigError(f"{other}: is of {theirs}, but {one} of {ours}")
+            second, first = f"{another.algorithm} on {another.env}", f"{run.algorithm} on {run.env}"
+            raise ConfigError(f"{other}: is a run of {second}, but {one} of {first}")
         if run.seed == another.seed:
             raise ConfigError(f"{other}: has the training seed {run.seed}, as {one} has; each run must have its own")
     return opened
 
 
-def _examine(folder: Path, run: Run, actor: Actor) -> Candidate:
-    """Fly a policy on the validation and on the test seeds."""
+def _test(folder: Path, run: Run, actor: Actor) -> Candidate:
+    """Evaluate a policy on the validation and on the test seeds."""
     last = read_curve(folder).iloc[-1]
     validation = evaluate(actor, run.scenario, seeds("validation", VALIDATION_EPISODES))
     episodes = evaluate(actor, run.scenario, seeds("test", TEST_EPISODES))
@@ -106,15 +110,15 @@ def _examine(folder: Path, run: Run, actor: Actor) -> Candidate:
 
 
 def _pretraining_s(folder: Path, run: Run) -> float | None:
-    """Time until there was an actor to start from, s; None if nobody knows, as where one was given."""
-    judged = read_pretraining(folder)
-    if judged is not None:
-        return float(judged["seconds"].max())
+    """Time that the pretraining took, s; None if unknown, as for a given actor."""
+    log = read_pretraining(folder)
+    if log is not None:
+        return float(log["seconds"].max())
     return None if run.agent.pretraining or run.start else 0.0
 
 
 def _saved(folder: Path, run: Run, episodes: pd.DataFrame) -> Interval | None:
-    """What was learnt after the start, of which there need not be one."""
+    """Reduction of the test cost since the actor that the run started from; None if there was none."""
     if not (folder / START).exists():
         return None
     start = evaluate(read_actor(folder / START, run.scenario), run.scenario, seeds("test", TEST_EPISODES))
@@ -123,23 +127,25 @@ def _saved(folder: Path, run: Run, episodes: pd.DataFrame) -> Interval | None:
 
 
 def _cost(episodes: pd.DataFrame) -> Interval:
-    """Minus the return."""
-    mean, low, high = summarise(episodes).loc["return"]
+    """Mean cost with its interval, minus the return."""
+    mean, low, high = (float(value) for value in summarise(episodes).loc["return", ["mean", "low", "high"]])
     return Interval(mean=-mean, low=-high, high=-low)
 
 
 def _card(candidates: Sequence[Candidate], tensors: bytes) -> Card:
     best = candidates[0]
-    summary = summarise(best.episodes)
+    summary = summarise(best.episodes)[["mean", "low", "high"]]
     training = {key: value for key, value in asdict(best.run).items() if key not in ("algorithm", "env", "scenario")}
     return Card(
         algorithm=best.run.algorithm,
         env=best.run.env,
         observation_size=SIZE,
         sha256=sha256(tensors),
-        test={str(name): Interval(**line) for name, line in summary.to_dict(orient="index").items()},
+        test={
+            str(name): Interval(mean=row["mean"], low=row["low"], high=row["high"]) for name, row in summary.iterrows()
+        },
         test_episodes=TEST_EPISODES,
-        first_test_costs_m_s=tuple(-best.episodes["return"].to_numpy(float)[:FIRST]),
+        first_test_costs_m_s=tuple(-best.episodes["return"].to_numpy(float)[:LISTED_EPISODES]),
         cost_over_runs_m_s=_over_runs([candidate.trained.test_cost_m_s.mean for candidate in candidates]),
         runs=tuple(candidate.trained for candidate in candidates),
         training=training,
@@ -148,9 +154,9 @@ def _card(candidates: Sequence[Candidate], tensors: bytes) -> Card:
 
 
 def _over_runs(costs: Sequence[float]) -> Interval | None:
-    """Mean over training seeds with Student's interval; the bootstrap of so few would be far too narrow."""
+    """Mean over training seeds with Student's interval; a bootstrap of so few values would be far too narrow."""
     if len(costs) < 2:
         return None
     mean = float(np.mean(costs))
-    half = float(stats.t.ppf(0.975, len(costs) - 1) * stats.sem(costs))
+    half = float(stats.t.ppf(TWO_SIDED_95, len(costs) - 1) * stats.sem(costs))
     return Interval(mean=mean, low=mean - half, high=mean + half)

@@ -1,67 +1,76 @@
-"""A training run's folder: what is in it, and how a model is saved to it and loaded from it."""
+"""Folder of a training run: its files, and how models are saved to it and loaded from it."""
 
+import hashlib
 import json
 import platform
 import subprocess
+from collections.abc import Mapping
 from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any, Final, Self
 
+import numpy as np
 import pandas as pd
 from pydantic import Field, Strict, model_validator
 
-from agents.hyperparameters import SETTINGS, AgentSettings, Algorithm, SACSettings
+from agents.algorithms.registry import ALGORITHMS, algorithm_settings
+from agents.hyperparameters import VALIDATION_EPISODES, VALIDATIONS, CommonSettings, NonNegativeInt, PositiveInt
 from agents.policy.actor import Actor, read_actor
 from formation_env.files import replacing, write_files
 from formation_env.settings import ConfigError, Text, build, load_json, settings
 from formation_env.task.scenario import Scenario
 
 MODEL: Final = "model.zip"
-"""The model that was best on the validation seeds, as Stable-Baselines3 saves it."""
+"""Best model on the validation seeds in Stable-Baselines3's format; its `predict` gives the environment's actions."""
 BEST: Final = "best.safetensors"
-"""Its actor alone, see `agents.policy.actor`."""
+"""Actor of that model, see `agents.policy.actor`."""
 START: Final = "start.safetensors"
-"""A copy of the actor that the run started from."""
+"""Copy of the actor that the run started from."""
 CHECKPOINT: Final = "checkpoint.pt"
 RUN: Final = "settings.json"
 CURVE: Final = "validation.csv"
 PRETRAINING: Final = "pretraining.csv"
-"""What came before, if anything did: done, seconds and return of each judgement; the last one is its end."""
+"""Log of the pretraining, if there was any: stage, seconds and return of each validation; the last line is its end."""
 PRETRAINED_BY: Final = ("pretraining", "network", "throttle_power", "magnification")
 """Hyperparameters that a pretrained actor depends on."""
 TENSORBOARD: Final = "tensorboard"
+DIGEST: Final = "sha256"
+"""Key of the settings' own hash in `RUN`: settings that have changed since do not belong to the run's other files."""
 
+CURVE_COLUMNS: Final = ("steps", "seconds", "return")
+PRETRAINING_COLUMNS: Final = ("seconds", "return")
+"""Columns that must hold finite numbers; `CURVE` has further metrics, `PRETRAINING` a text in `done`."""
 LIBRARIES: Final = ("formation-env", "gymnasium", "numpy", "stable-baselines3", "torch")
 
 
 @settings
 class Run:
-    """All that made a run, so that it can be redone and its models need nothing else.
+    """Complete settings of a run: enough to repeat it and to use its models.
 
     Attributes:
-        algorithm: which.
-        env: the environment as it was asked for.
-        seed: of the training.
+        algorithm: name of the algorithm.
+        env: environment as the user named it.
+        seed: seed of the training.
         steps: environment steps to train for.
         validation_episodes: episodes of each validation.
-        validations: validations, evenly over the run.
-        threads: of torch; other numbers give other rounding.
-        agent: the hyperparameters.
-        scenario: what is flown.
-        start: path of the actor that it starts from, or of the run whose pretrained actor that is, if it does.
-        command: the command line.
-        versions: of the libraries, and the revision of the sources.
+        validations: number of validations, evenly spaced over the run.
+        threads: threads of torch; another number rounds differently.
+        agent: hyperparameters.
+        scenario: task that is flown.
+        start: path of the actor that the run starts from, or of a run whose pretrained actor it takes; empty for none.
+        command: command line.
+        versions: versions of the libraries, and git revision of the sources.
     """
 
-    algorithm: Algorithm
+    algorithm: Text
     env: Text
-    seed: Annotated[int, Strict(), Field(ge=0)] = 0
-    steps: Annotated[int, Strict(), Field(ge=1)]
-    validation_episodes: Annotated[int, Strict(), Field(ge=2)] = 64
-    validations: Annotated[int, Strict(), Field(ge=1)] = 20
-    threads: Annotated[int, Strict(), Field(ge=1)] = 1
-    agent: AgentSettings
+    seed: NonNegativeInt = 0
+    steps: PositiveInt
+    validation_episodes: Annotated[int, Strict(), Field(ge=2)] = VALIDATION_EPISODES
+    validations: PositiveInt = VALIDATIONS
+    threads: PositiveInt = 1
+    agent: CommonSettings
     scenario: Scenario
     start: Text = ""
     command: Text = ""
@@ -69,84 +78,123 @@ class Run:
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """Refuse critics of after-states where a thrust leads elsewhere in each variant of the scenario."""
-        if self.scenario.domain_randomization and isinstance(self.agent, SACSettings) and self.agent.after_state:
-            raise ValueError("agent.after_state: must be false for a scenario with domain_randomization, got true")
+        """Refuse hyperparameters of another algorithm, or ones that cannot train on the scenario."""
+        if type(self.agent) is not ALGORITHMS.get(self.algorithm):
+            raise ValueError(f"agent: must be the hyperparameters of {self.algorithm}, got {type(self.agent).__name__}")
+        self.agent.check_scenario(self.scenario)
         return self
 
 
+def run_sha256(run: Run) -> str:
+    """Identity of a run: the hash of its settings."""
+    return _digest(asdict(run))
+
+
+def _digest(data: Mapping[str, Any]) -> str:
+    """Hash of settings as plain data, without a hash that they contain."""
+    content = {key: value for key, value in data.items() if key != DIGEST}
+    return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
 def versions() -> dict[str, str]:
-    """Versions of the interpreter and of the libraries behind a model, and git's revision of a checkout."""
+    """Versions of the interpreter and of the libraries behind a model, and the git revision of a checkout."""
     libraries = {name: metadata.version(name) for name in LIBRARIES}
-    return {"python": platform.python_version()} | libraries | {"git": _revision(Path(__file__).parent)}
+    return {"python": platform.python_version()} | libraries | {"git": _revision(Path(__file__).parents[1])}
 
 
-def _revision(folder: Path) -> str:
-    """What git calls the sources, `-dirty` if they were changed since; empty where there is no git."""
-    command = ["git", "-C", str(folder), "describe", "--always", "--dirty", "--exclude=*", "--abbrev=40"]
+def _revision(package: Path) -> str:
+    """Git revision of the repository whose top folder contains the package, `-dirty` if changed; empty without one.
+
+    A package installed below some other repository, as in a virtual environment, has no revision of its own.
+    """
+    if _git(package, "rev-parse", "--show-toplevel") != str(package.parent.resolve()):
+        return ""
+    return _git(package, "describe", "--always", "--dirty", "--exclude=*", "--abbrev=40")
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    """Output of a git command; empty if it fails or git is not installed."""
     try:
+        command = ["git", "-C", str(folder), *arguments]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         return ""
 
 
 def start_run(run: Run, folder: Path) -> None:
-    """Make a run's folder and write its settings, and a copy of the actor that it starts from.
+    """Make a run's folder, write its settings, and copy the actor that it starts from.
 
     Raises:
-        ConfigError: the folder holds a run already.
+        ConfigError: the folder already holds a run.
         OSError: it cannot be written.
     """
-    if (folder / RUN).exists():
-        raise ConfigError(f"{folder}: holds a run already; go on with --resume {folder}, or give another folder")
-    files = {RUN: (json.dumps(asdict(run), indent=2) + "\n").encode()}
+    check_new(folder)
+    files = {RUN: (json.dumps(asdict(run) | {DIGEST: run_sha256(run)}, indent=2) + "\n").encode()}
     if run.start:
-        files |= _given(Path(run.start))
+        files |= _start_files(Path(run.start))
     write_files(folder, files)
 
 
-def _given(start: Path) -> dict[str, bytes]:
-    """What a run takes from its start: an actor's file, or another run's pretrained actor and how it came about."""
+def check_new(folder: Path) -> None:
+    """Refuse a folder that already holds a run.
+
+    Raises:
+        ConfigError: it does.
+    """
+    if (folder / RUN).exists():
+        raise ConfigError(f"{folder}: holds a run already; continue it with --out {folder} --resume, or name another")
+
+
+def _start_files(start: Path) -> dict[str, bytes]:
+    """Files that a run copies from its start: an actor, or another run's pretrained actor with its log."""
     if not start.is_dir():
         return {START: start.read_bytes()}
     return {name: (start / name).read_bytes() for name in (START, PRETRAINING)}
 
 
 def start_file(run: Run) -> Path | None:
-    """The file of the actor that a run starts from, if one is given.
+    """File of the actor that a run starts from, if one is given.
 
     Raises:
-        ConfigError: it is another run's, which was pretrained in another way.
+        ConfigError: it belongs to another run that was pretrained differently.
     """
     start = Path(run.start)
     if not run.start or not start.is_dir():
         return start if run.start else None
-    theirs = load_run(start)
-    if theirs.scenario != run.scenario:
-        raise ConfigError(f"{start}: is of {theirs.env}; its scenario must be this run's, {run.env}")
-    pairs = {"seed": (run.seed, theirs.seed)}
-    pairs |= {key: (getattr(run.agent, key), getattr(theirs.agent, key)) for key in PRETRAINED_BY}
-    for key, (wanted, got) in pairs.items():
-        if wanted != got:
-            raise ConfigError(f"{start}: {key}: must be this run's, {wanted}, got {got}")
+    other = load_run(start)
+    if other.scenario != run.scenario:
+        raise ConfigError(f"{start}: was trained on {other.env}; its scenario must be this run's, {run.env}")
+    pairs = {"seed": (run.seed, other.seed)}
+    pairs |= {key: (getattr(run.agent, key), getattr(other.agent, key)) for key in PRETRAINED_BY}
+    for key, (expected, given) in pairs.items():
+        if expected != given:
+            raise ConfigError(f"{start}: {key}: must be this run's, {expected}, got {given}")
     return start / START
 
 
 def load_run(folder: Path) -> Run:
-    """A run's settings.
+    """Read a run's settings.
 
     Raises:
-        ConfigError: no run is there, or its settings are wrong; one line.
+        ConfigError: the folder holds no run, or its settings are faulty or were changed; one line.
     """
     path = folder / RUN
     data = load_json(path)
-    if isinstance(data, dict) and data.get("algorithm") in SETTINGS:
-        data["agent"] = build(SETTINGS[data["algorithm"]], data.get("agent"), f"{path}: agent")
-    return build(Run, data, str(path))
+    if not isinstance(data, dict) or "algorithm" not in data:
+        raise ConfigError(f"{path}: algorithm: missing, so this is not a run's settings")
+    try:
+        data["agent"] = build(algorithm_settings(str(data["algorithm"])), data.get("agent"), "agent")
+    except ConfigError as error:
+        raise ConfigError("\n".join(f"{path}: {line}" for line in str(error).splitlines())) from None
+    digest = data.pop(DIGEST, None)
+    run = build(Run, data, str(path))
+    if digest != run_sha256(run):
+        raise ConfigError(f"{path}: {DIGEST}: does not match; the settings were damaged or changed after the start")
+    return run
 
 
 def save_model(model: Any, path: Path) -> None:
-    """Save an SB3 model at once: interrupted, it leaves the old one.
+    """Save an SB3 model atomically: if interrupted, the old file remains.
 
     Raises:
         OSError: the folder cannot be written.
@@ -156,38 +204,53 @@ def save_model(model: Any, path: Path) -> None:
 
 
 def load_best(folder: Path) -> tuple[Run, Actor]:
-    """A run and the policy that was best on its validation seeds. Nothing is unpickled.
+    """Load a run and its best policy on the validation seeds. Nothing is unpickled.
 
     Raises:
-        ConfigError: no run or no policy is there, or a file is damaged; one line.
+        ConfigError: the folder holds no run or no policy, or a file is damaged; one line.
     """
     run = load_run(folder)
     return run, read_actor(folder / BEST, run.scenario)
 
 
 def read_curve(folder: Path) -> pd.DataFrame:
-    """A run's validations, one line each.
+    """Read a run's validations, one row each.
 
     Raises:
-        ConfigError: there are none.
+        ConfigError: there are none, or the file is damaged.
     """
-    return _read_lines(folder / CURVE)
+    path = folder / CURVE
+    table = _read_table(path, CURVE_COLUMNS)
+    if (table["steps"].diff()[1:] <= 0).any():
+        raise ConfigError(f"{path}: steps: must increase from line to line")
+    return table
 
 
 def read_pretraining(folder: Path) -> pd.DataFrame | None:
-    """The judgements during a run's pretraining, one line each; None if the run has no such file.
+    """Read the validations of a run's pretraining, one row each; None without such a file.
 
     Raises:
-        ConfigError: the file cannot be read.
+        ConfigError: the file cannot be read, or is damaged.
     """
     path = folder / PRETRAINING
-    return _read_lines(path) if path.exists() else None
+    return _read_table(path, PRETRAINING_COLUMNS) if path.exists() else None
 
 
-def _read_lines(path: Path) -> pd.DataFrame:
+def _read_table(path: Path, numeric: tuple[str, ...]) -> pd.DataFrame:
+    """A CSV file with at least one row, whose named columns hold finite numbers."""
     try:
-        return pd.read_csv(path)
+        table = pd.read_csv(path)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
     except pd.errors.EmptyDataError:
         raise ConfigError(f"{path}: has no validation yet") from None
+    except ValueError as error:  # among them pandas' ParserError and UnicodeDecodeError
+        raise ConfigError(f"{path}: damaged: {' '.join(str(error).split())[:80]}") from None
+    for name in numeric:
+        if name not in table:
+            raise ConfigError(f"{path}: {name}: this column is missing")
+        if table[name].dtype.kind not in "if" or not np.isfinite(table[name]).all():
+            raise ConfigError(f"{path}: {name}: must hold finite numbers only")
+    if table.empty:
+        raise ConfigError(f"{path}: has no validation yet")
+    return table

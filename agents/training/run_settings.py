@@ -1,9 +1,10 @@
-"""From what the user asks for to a run's settings."""
+"""From the user's choices to a run's settings."""
 
 from dataclasses import asdict
 from pathlib import Path
 
-from agents.hyperparameters import ALGORITHMS, AgentSettings, load_settings
+from agents.algorithms.registry import load_settings
+from agents.hyperparameters import VALIDATION_EPISODES, VALIDATIONS, CommonSettings
 from agents.training.run_folder import Run, versions
 from formation_env.settings import ConfigError, build, nearest
 from formation_env.task.loading import ENV_IDS, load_scenario
@@ -12,36 +13,35 @@ from formation_env.task.loading import ENV_IDS, load_scenario
 def plan_run(
     algorithm: str,
     env: str,
+    *,
     steps: int | None = None,
     seed: int = 0,
     rows: int | None = None,
     config: Path | None = None,
-    validations: int = 20,
-    validation_episodes: int = 64,
+    validations: int = VALIDATIONS,
+    validation_episodes: int = VALIDATION_EPISODES,
     threads: int = 1,
     start: Path | None = None,
     command: str = "",
 ) -> Run:
-    """A run with its hyperparameters and scenario read from their files.
+    """Settings of a run, with hyperparameters and scenario read from their files.
 
     Args:
-        algorithm: `ppo` or `sac`.
+        algorithm: a name in `agents.algorithms.registry.ALGORITHMS`.
         env: a registered id, or a scenario's name or path.
         steps: environment steps; by default as in the file of hyperparameters.
-        seed: of the training.
+        seed: seed of the training.
         rows: environments side by side; by default as in the file of hyperparameters.
         config: that file; by default configs/agents/ALGORITHM.yaml.
-        validations: how many over the run.
+        validations: number of validations over the run.
         validation_episodes: episodes of each.
-        threads: of torch.
-        start: an actor to start from: its file, or the folder of a run that was pretrained in the same way.
-        command: the command line, to be noted.
+        threads: threads of torch.
+        start: actor to start from: its file, or the folder of a run that was pretrained with the same settings.
+        command: command line, recorded with the run.
 
     Raises:
-        ConfigError: anything in it is wrong; one line per fault, naming file, key and value.
+        ConfigError: any of it is wrong; one line per fault, naming file, key and value.
     """
-    if algorithm not in ALGORITHMS:
-        raise ConfigError(f"no algorithm named {algorithm!r}; {nearest(algorithm, ALGORITHMS)}")
     if env.endswith("-v0") and env not in ENV_IDS:
         raise ConfigError(f"no environment named {env!r}; {nearest(env, ENV_IDS)}")
     agent = _with_rows(load_settings(algorithm, Path(env).stem, config), rows)
@@ -62,10 +62,10 @@ def plan_run(
     return build(Run, data, "train")
 
 
-def _with_rows(agent: AgentSettings, rows: int | None) -> AgentSettings:
+def _with_rows(agent: CommonSettings, rows: int | None) -> CommonSettings:
     return agent if rows is None else build(type(agent), asdict(agent) | {"rows": rows}, "--rows")
 
 
 def default_folder(run: Run) -> Path:
-    """Where a run is kept if nothing else is said: runs/ALGORITHM_ENV_seedN."""
+    """Folder of a run unless the user names one: runs/ALGORITHM_ENV_seedN."""
     return Path("runs") / f"{run.algorithm}_{Path(run.env).stem}_seed{run.seed}"

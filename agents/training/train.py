@@ -1,4 +1,4 @@
-"""Training: a model, its batched environment and its validation, from start to end, or from stop to stop."""
+"""Training: a model, its batched environment and its validation, from the start or from a checkpoint to the end."""
 
 import contextlib
 import math
@@ -17,9 +17,19 @@ from tqdm import tqdm
 
 from agents.algorithms.models import make_env, make_model
 from agents.policy.actor import Functions, to_bytes
-from agents.pretraining.pretrain import pretrain
+from agents.pretraining.pretrain import check_pretraining, pretrain
 from agents.training.checkpoint import State, load_checkpoint, restore
-from agents.training.run_folder import CHECKPOINT, PRETRAINING, START, TENSORBOARD, Run, load_run, start_file, start_run
+from agents.training.run_folder import (
+    CHECKPOINT,
+    PRETRAINING,
+    START,
+    TENSORBOARD,
+    Run,
+    check_new,
+    load_run,
+    start_file,
+    start_run,
+)
 from agents.training.validation import Outcome, Validation
 from agents.training.warm_start import start_from
 from formation_env.evaluation.seeds import seeds
@@ -28,7 +38,7 @@ from formation_env.settings import ConfigError
 
 
 def training_seeds(seed: int, rows: int) -> range:
-    """Seeds of the rows' environments: of the training split, and others for each seed of a run.
+    """Seeds of the rows' environments: of the training split, and different for each seed of a run.
 
     Raises:
         ConfigError: there are not so many.
@@ -39,31 +49,48 @@ def training_seeds(seed: int, rows: int) -> range:
         raise ConfigError(f"seed: no training seeds are left for {rows} rows, got {seed}") from None
 
 
-Lines = Sequence[Mapping[str, float]]
-"""Of a learning curve, see `Validation`."""
+Curve = Sequence[Mapping[str, float]]
+"""Learning curve up to now, see `Validation`."""
 
 
-def _never(lines: Lines) -> bool:
+def _never(curve: Curve) -> bool:
     return False
 
 
-def train(run: Run, folder: Path, time_limit_s: float = math.inf, give_up: Callable[[Lines], bool] = _never) -> Outcome:
-    """Train as the run says, and keep all in its folder. An interrupt (Ctrl-C) saves and ends.
-
-    Args:
-        run: what to train.
-        folder: of the run; must not hold one yet.
-        time_limit_s: the training stops before the first rollout after this time; s.
-        give_up: asked before each rollout whether to stop for good, told the learning curve up to there.
-
-    Returns:
-        Why it ended.
+def check_run(run: Run) -> None:
+    """Refuse a run that would fail later, before any work is done.
 
     Raises:
-        ConfigError: the folder holds a run already, the seed is too large, or the actor to start from does not fit.
-        OSError: the folder cannot be written.
+        ConfigError: too few seeds for the run, or a scenario that pretraining cannot differentiate; one line.
     """
     training_seeds(run.seed, run.agent.rows)
+    try:
+        seeds("validation", run.validation_episodes)
+    except ValueError as error:
+        raise ConfigError(f"validation_episodes: {error}") from None
+    if run.agent.pretraining is not None and not run.start:
+        check_pretraining(run.agent.pretraining, run.scenario, run.seed)
+
+
+def train(run: Run, folder: Path, time_limit_s: float = math.inf, give_up: Callable[[Curve], bool] = _never) -> Outcome:
+    """Train with a run's settings and keep the results in its folder. Ctrl-C saves a checkpoint and ends.
+
+    Args:
+        run: settings.
+        folder: of the run; must not hold one yet.
+        time_limit_s: the training stops before the first rollout after this time; s.
+        give_up: called before each rollout with the learning curve; True ends the training.
+
+    Returns:
+        Reason for the end.
+
+    Raises:
+        ConfigError: the folder holds a run already, the run fails `check_run`, or the actor to start from does not
+            fit.
+        OSError: the folder cannot be written.
+    """
+    check_new(folder)
+    check_run(run)
     start = start_file(run)
     if run.agent.pretraining is None or start:
         model = _new_model(run, start)
@@ -75,62 +102,70 @@ def train(run: Run, folder: Path, time_limit_s: float = math.inf, give_up: Calla
 
 
 def resume(folder: Path, time_limit_s: float = math.inf) -> Outcome:
-    """Go on with a run from its last checkpoint, as if it had never stopped.
+    """Continue a run from its last checkpoint; the result has the same bits as without the interruption.
 
     Args:
         folder: of the run.
-        time_limit_s: as in `train`, from now on.
+        time_limit_s: as in `train`, counted from now.
 
     Returns:
-        Why it ended.
+        Reason for the end.
 
     Raises:
-        ConfigError: no run is there, or one of its files is faulty.
+        ConfigError: the folder holds no run, or one of its files is faulty.
         OSError: the folder cannot be written.
     """
     run = load_run(folder)
+    checkpoint = folder / CHECKPOINT
+    state = load_checkpoint(checkpoint, run) if checkpoint.exists() else None
     model = _new_model(run, pretrained(run, folder) if run.agent.pretraining or run.start else None)
-    state = load_checkpoint(folder / CHECKPOINT) if (folder / CHECKPOINT).exists() else None
     if state is not None:
         restore(model, state)
     return _learn(model, run, folder, state, time_limit_s)
 
 
 def pretrained(run: Run, folder: Path) -> Path:
-    """The actor in a run's folder that it starts from; made, if it is not there yet."""
+    """File of the actor that a run starts from, in the run's folder; pretrained now if it does not exist."""
     path, agent = folder / START, run.agent
     if agent.pretraining is not None and not path.exists():
         torch.set_num_threads(run.threads)
         functions = Functions(agent.network.activation, "tanh", agent.throttle_power, agent.magnification)
-        told = Judgements(run.validation_episodes)
+        log = PretrainingLog(run.validation_episodes)
         actor = pretrain(
-            agent.pretraining, agent.network, functions, run.scenario, run.seed, run.validation_episodes, told.note
+            agent.pretraining,
+            agent.network,
+            functions,
+            run.scenario,
+            seed=run.seed,
+            validation_episodes=run.validation_episodes,
+            progress=log.add,
         )
-        write_files(folder, {START: to_bytes(actor), PRETRAINING: told.csv().encode()})  # the first appears last
+        # Files are renamed last to first: an actor never lies in the folder without its log.
+        write_files(folder, {START: to_bytes(actor), PRETRAINING: log.to_csv().encode()})
     return path
 
 
-class Judgements:
-    """What pretraining came to, from time to time; the clock starts with the object."""
+class PretrainingLog:
+    """Validation costs during pretraining; the clock starts with the object."""
 
     def __init__(self, episodes: int) -> None:
         self._episodes = episodes
         self._start_s = time.perf_counter()
         self._lines: list[tuple[str, float, float]] = []
 
-    def note(self, done: str, cost: float) -> None:
-        """Remember and show what has been done, and the mean validation cost that it came to, m/s."""
-        self._lines.append((done, round(time.perf_counter() - self._start_s, 1), -cost))
-        tqdm.write(f"{done}: {cost:.4f} m/s on {self._episodes} validation seeds")
+    def add(self, stage: str, cost: float) -> None:
+        """Record and print the mean validation cost after a stage, m/s."""
+        self._lines.append((stage, time.perf_counter() - self._start_s, -cost))
+        tqdm.write(f"{stage}: {cost:.4f} m/s on {self._episodes} validation seeds")
 
-    def csv(self) -> str:
-        """The file `PRETRAINING`; its last line is the end, where all that is done is judged."""
+    def to_csv(self) -> str:
+        """Content of the file `PRETRAINING`; its last line is the end of the pretraining."""
         table = pd.DataFrame(self._lines, columns=["done", "seconds", "return"])
         return table.to_csv(index=False, float_format="%.6g")
 
 
 def _new_model(run: Run, start: Path | None) -> BaseAlgorithm:
-    """A model before its first step, with the actor of a file if there is one to start from."""
+    """Build a model before its first step, with the actor of a file if one is given."""
     first = training_seeds(run.seed, run.agent.rows)[0]
     torch.set_num_threads(run.threads)
     env = make_env(run.agent, run.scenario)
@@ -147,26 +182,26 @@ def _learn(
     folder: Path,
     state: State | None,
     time_limit_s: float,
-    give_up: Callable[[Lines], bool] = _never,
+    give_up: Callable[[Curve], bool] = _never,
 ) -> Outcome:
-    """Train up to the run's last step, or until it has to end."""
+    """Train up to the run's last step, or until something ends it earlier."""
     model.set_logger(configure(str(folder / TENSORBOARD), ["tensorboard"]))
     ends_s = time.perf_counter() + time_limit_s
-    with _stop_asked() as stop, _bar(run, model.num_timesteps) as bar:
+    with _stop_requested() as stop, _bar(run, model.num_timesteps) as bar:
 
-        def must_end() -> Outcome | None:
+        def reason_to_end() -> Outcome | None:
             if stop.is_set():
                 return "interrupted"
             if give_up(validation.lines):
                 return "given up"
             return "out of time" if time.perf_counter() > ends_s else None
 
-        validation = Validation(run, folder, bar, must_end, state)
+        validation = Validation(run, folder, bar, reason_to_end, state)
         try:
             model.learn(run.steps - model.num_timesteps, validation, reset_num_timesteps=state is None)
             if validation.outcome is None:
-                validation.note()
-        except KeyboardInterrupt:  # the second one; the last checkpoint stays
+                validation.run_now()
+        except KeyboardInterrupt:  # a second Ctrl-C; the last checkpoint remains
             validation.outcome = "interrupted"
         finally:
             model.logger.close()
@@ -178,22 +213,22 @@ def _bar(run: Run, done: int) -> "tqdm[Any]":
 
 
 @contextlib.contextmanager
-def _stop_asked() -> Iterator[threading.Event]:
-    """Ctrl-C and SIGTERM ask to stop where the model is whole; the second one interrupts at once, as ever."""
-    asked = threading.Event()
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+def _stop_requested() -> Iterator[threading.Event]:
+    """The first Ctrl-C or SIGTERM requests a stop between two rollouts; the second one interrupts at once."""
+    requested = threading.Event()
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
-    def ask(number: int, frame: object) -> None:
-        asked.set()
-        put_back()
+    def request(number: int, frame: object) -> None:
+        requested.set()
+        restore_handlers()
 
-    def put_back() -> None:
-        for number, handler in before.items():
+    def restore_handlers() -> None:
+        for number, handler in handlers.items():
             signal.signal(number, handler)
 
     try:
-        for number in before:
-            signal.signal(number, ask)
-        yield asked
+        for number in handlers:
+            signal.signal(number, request)
+        yield requested
     finally:
-        put_back()
+        restore_handlers()

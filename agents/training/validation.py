@@ -1,4 +1,4 @@
-"""Validation during training: the curve, the best policy, and the checkpoints."""
+"""Validation during training: learning curve, best policy and checkpoints."""
 
 import math
 import time
@@ -23,7 +23,7 @@ from formation_env.task.scenario import Scenario
 Outcome = Literal["finished", "interrupted", "out of time", "given up"]
 
 MEANS: Final = ("delta_v_m_s", "position_error_mean_m")
-"""Metrics noted besides the return."""
+"""Metrics recorded besides the return."""
 
 
 def validate(policy: Policy, scenario: Scenario, episodes: int) -> dict[str, float]:
@@ -35,60 +35,61 @@ def validate(policy: Policy, scenario: Scenario, episodes: int) -> dict[str, flo
 
 
 class Validation(BaseCallback):
-    """Flies the validation seeds from time to time; writes curve, best policy and checkpoint; moves the bar.
+    """Callback that flies the validation seeds, writes curve, best policy and checkpoint, and moves the bar.
 
     Attributes:
-        lines: of the curve: steps, seconds, return, return_low, return_high, and `MEANS`.
-        outcome: why the training has ended, once it has.
+        lines: rows of the curve: steps, seconds, return, return_low, return_high, and `MEANS`.
+        outcome: reason for the end of the training; None before it.
     """
 
     def __init__(
-        self, run: Run, folder: Path, bar: "tqdm[Any]", must_end: Callable[[], Outcome | None], state: State | None
+        self, run: Run, folder: Path, bar: "tqdm[Any]", reason_to_end: Callable[[], Outcome | None], state: State | None
     ) -> None:
         """Make the callback of one call of `learn`.
 
         Args:
-            run: what is trained.
+            run: settings of the training.
             folder: of the run.
-            bar: of the progress.
-            must_end: asked before each rollout whether the training shall end there, and why.
-            state: the checkpoint that it goes on from, if there is one.
+            bar: progress bar.
+            reason_to_end: called before each rollout; a reason ends the training there.
+            state: checkpoint from which the training continues, if there is one.
         """
         super().__init__()
         self._run = run
         self._folder = folder
         self._bar = bar
-        self._must_end = must_end
+        self._reason_to_end = reason_to_end
         self._state = state
         self._start_s = time.perf_counter() - (state["notes"]["seconds"] if state else 0.0)
         self.lines: list[dict[str, float]] = state["notes"]["lines"] if state else []
         self.outcome: Outcome | None = None
 
     def _on_rollout_start(self) -> None:
-        """The model is whole here: all updates of the last rollout are done."""
+        """Validate and save between two rollouts, when all updates of the last one are done."""
         if self._state is not None:
             restore_random(self.model, self._state)
             self._state = None
         if self.num_timesteps >= len(self.lines) * self._run.steps / self._run.validations:
-            self.note()
-        self.outcome = self._must_end()
+            self.run_now()
+        self.outcome = self._reason_to_end()
         if self.outcome is not None:
             self._save()
-        if self._run.agent.use_sde:  # SB3 drew it before this; drawn here, a training that goes on draws the same
-            self.model.policy.reset_noise(self.training_env.num_envs)
+        if self._run.agent.use_sde:  # SB3 drew it before this call; a resumed training draws it here, so both do
+            reset_noise: Any = self.model.policy.reset_noise
+            reset_noise(self.training_env.num_envs)
 
     def _on_step(self) -> bool:
         self._bar.update(min(self.training_env.num_envs, self._run.steps - self._bar.n))
         return self.outcome is None
 
-    def note(self) -> None:
-        """Validate now, if that has not been done at this step; keep the policy if it is the best, and a checkpoint."""
+    def run_now(self) -> None:
+        """Validate unless done at this step; keep the policy if it is the best so far; write a checkpoint."""
         if self.lines and self.lines[-1]["steps"] == self.num_timesteps:
             return
         best = max((line["return"] for line in self.lines), default=-math.inf)
         actor = actor_of(self.model, self._run.agent.throttle_power, self._run.scenario)
         line = validate(actor, self._run.scenario, self._run.validation_episodes)
-        self.lines.append({"steps": self.num_timesteps, "seconds": round(self._seconds(), 1), **line})
+        self.lines.append({"steps": self.num_timesteps, "seconds": self._seconds(), **line})
         self._log(line)
         if line["return"] > best:
             save_model(self.model, self._folder / MODEL)
@@ -97,13 +98,14 @@ class Validation(BaseCallback):
         self._bar.set_postfix_str(f"return {line['return']:.3f}, best {max(best, line['return']):.3f} m/s")
 
     def _save(self) -> None:
-        """Keep the state as it is now, and the curve up to now."""
-        save_checkpoint(self._folder / CHECKPOINT, self.model, {"lines": self.lines, "seconds": self._seconds()})
+        """Write the checkpoint and the curve."""
+        notes = {"lines": self.lines, "seconds": self._seconds()}
+        save_checkpoint(self._folder / CHECKPOINT, self.model, self._run, notes)
         with replacing(self._folder / CURVE) as temporary:
             pd.DataFrame(self.lines).to_csv(temporary, index=False, float_format="%.6g")
 
     def _seconds(self) -> float:
-        """Time that the training has taken, without the time that it was not running."""
+        """Time that the training has taken, without interruptions, s."""
         return time.perf_counter() - self._start_s
 
     def _log(self, line: dict[str, float]) -> None:

@@ -1,1 +1,1 @@
-"""Search of hyperparameters: trainings from one pretrained actor, judged on validation seeds."""
+"""Hyperparameter search: trainings from one pretrained actor, compared on validation seeds."""

@@ -1,7 +1,7 @@
-"""How it is searched: trial by trial by Optuna's TPE, hopeless ones given up, kept in a journal to go on from.
+"""Search trial by trial with Optuna's TPE and early stopping, in a journal from which it continues.
 
-A candidate depends on the finished trials before it alone, and its random numbers on its place; a training repeats
-itself. So a search in several goes finds what one go would have found.
+A candidate depends only on the finished trials before it, its random numbers on its index, and a training is
+reproducible. So an interrupted and continued search gives the same result as an uninterrupted one.
 """
 
 import hashlib
@@ -13,138 +13,149 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from agents.hyperparameters import AgentSettings
+from agents.algorithms.registry import ALGORITHMS
+from agents.hyperparameters import CommonSettings
 from agents.training.run_folder import Run, read_curve, start_file
-from agents.training.train import pretrained, train
-from agents.tuning.knobs import KNOBS, present, turned
-from baselines.tuning.gain_file import commented
+from agents.training.train import check_run, pretrained, train
+from agents.tuning.journal import check_seal, seal
+from agents.tuning.search_space import apply, current_values, search_space
+from baselines.tuning.settings_file import commented
 from baselines.tuning.study import distributions, open_study
 from formation_env.files import write_texts
+from formation_env.settings import ConfigError
 
 if TYPE_CHECKING:
     from optuna.trial import FrozenTrial
 
 JOURNAL: Final = "trials.journal"
 BEST: Final = "best.yaml"
-"""The best hyperparameters up to now, as `--config` of a training takes them."""
-FEW: Final = 4
-"""Trials that go to their end before any is given up."""
+"""Best hyperparameters so far, in the form that `--config` of a training takes."""
+MIN_TRIALS_BEFORE_PRUNING: Final = 4
+"""Trials that are trained to the end before any is stopped early: a median of fewer says little."""
 
 
 @dataclass(frozen=True)
-class Found:
-    """Where a search stands.
+class SearchResult:
+    """State of a search.
 
     Attributes:
-        agent: the best hyperparameters.
-        cost: validation cost at their training's end, m/s.
-        trial: which trial it was; 0 has the hyperparameters that the search began with.
-        first_cost: of trial 0, m/s.
-        trials: how many have been finished or given up.
+        agent: best hyperparameters.
+        cost: validation cost at the end of their training, m/s.
+        trial: index of that trial; trial 0 has the initial hyperparameters.
+        first_cost: cost of trial 0, m/s.
+        trials: number of trials that are finished or were stopped early.
     """
 
-    agent: AgentSettings
+    agent: CommonSettings
     cost: float
     trial: int
     first_cost: float
     trials: int
 
     def in_words(self) -> str:
-        """For people."""
+        """One-line summary for the user."""
         return (
             f"best of {self.trials} trials: {self.cost:.5g} m/s on the validation seeds (trial {self.trial}; "
             f"trial 0: {self.first_cost:.5g} m/s)"
         )
 
 
-def search(run: Run, trials: int, folder: Path, tell: Callable[[Found], Any] = lambda found: None) -> Found:
-    """The best of a number of trials; those that the journal has are not trained again.
+def search(
+    run: Run, trials: int, folder: Path, progress: Callable[[SearchResult], Any] = lambda result: None
+) -> SearchResult:
+    """Run trials until there are as many as asked for; those in the journal are not repeated.
 
-    A trial costs what its policy costs on the validation seeds at the training's end, and not at its best: what all
-    begin with may be better than what most come to.
+    The cost of a trial is that on the validation seeds at the end of its training and not the best one on the way: the
+    common starting point may be better than the end of most trainings.
 
     Args:
-        run: the training; `steps` and all else count for each trial, but for the hyperparameters that are searched.
-        trials: how many, with the run's own hyperparameters as trial 0.
+        run: settings of each training, except for the hyperparameters that are searched.
+        trials: number of trials, with the run's own hyperparameters as trial 0.
         folder: of the journal, of the actor that all trials start from, and of the best hyperparameters.
-        tell: called after each trial.
+        progress: called after each trial.
 
     Raises:
-        ConfigError: a file in the folder is no journal, or the run's actor to start from does not fit.
+        ConfigError: the run fails `check_run`, a file in the folder is damaged, or the actor does not fit.
         KeyboardInterrupt: a training was interrupted; the trials before it are kept.
         OSError: the folder cannot be written.
         ModuleNotFoundError: Optuna is not installed.
     """
-    name = task_name(run)
-    study = open_study(name, folder / JOURNAL)
-    run = _started(run, folder / name)
+    check_run(run)
+    name, journal = task_name(run), folder / JOURNAL
+    check_seal(journal)
+    study = open_study(name, journal)
+    run = _with_shared_start(run, folder / name)
     while len(known := study.get_trials(deepcopy=False)) < trials:
-        study.add_trial(_try(run, known))
-        found = best_of(run, study.get_trials(deepcopy=False))
-        write_texts(folder, {BEST: _to_yaml(run, found)})
-        tell(found)
+        study.add_trial(_run_trial(run, known))
+        seal(journal)
+        result = best_of(run, study.get_trials(deepcopy=False))
+        write_texts(folder, {BEST: _to_yaml(run, result)})
+        progress(result)
     return best_of(run, known[:trials])
 
 
 def task_name(run: Run) -> str:
-    """Of a study: a hash of all that a trial's cost depends on, so that no study goes on with another task."""
+    """Name of a study: a hash of everything that a trial's cost depends on, so that tasks are never mixed."""
     given = start_file(run)
     start = hashlib.sha256(given.read_bytes()).hexdigest() if given else ""
     task = replace(run, env="-", start="", command="", versions={})
-    return hashlib.sha256(repr((task, start, KNOBS[run.algorithm])).encode()).hexdigest()[:16]
+    space = search_space(ALGORITHMS[run.algorithm])
+    return hashlib.sha256(repr((task, start, space)).encode()).hexdigest()[:16]
 
 
-def _started(run: Run, folder: Path) -> Run:
-    """The run, beginning with an actor that was pretrained once for all trials, if it is to be pretrained."""
+def _with_shared_start(run: Run, folder: Path) -> Run:
+    """Replace the run's pretraining by an actor that is pretrained once for all trials."""
     if run.start or run.agent.pretraining is None:
         return run
     return replace(run, start=str(pretrained(run, folder)))
 
 
-def best_of(run: Run, known: Sequence["FrozenTrial"]) -> Found:
-    """The best of the trials that were not given up."""
+def best_of(run: Run, known: Sequence["FrozenTrial"]) -> SearchResult:
+    """Best trial among those that were trained to the end."""
     costs = [np.inf if trial.values is None else float(trial.values[0]) for trial in known]
     best = int(np.argmin(costs))
-    return Found(turned(run.algorithm, run.agent, known[best].params), costs[best], best, costs[0], len(known))
+    return SearchResult(apply(run.agent, known[best].params), costs[best], best, costs[0], len(known))
 
 
-def _try(run: Run, known: Sequence["FrozenTrial"]) -> "FrozenTrial":
-    """The trial that follows the known ones, trained."""
+def _run_trial(run: Run, known: Sequence["FrozenTrial"]) -> "FrozenTrial":
+    """Choose and train the candidate that follows the known trials."""
     from optuna import create_study
     from optuna.samplers import TPESampler
     from optuna.trial import TrialState, create_trial
 
-    knobs = KNOBS[run.algorithm]
-    # asked in memory, so that a journal has no trial without its end
+    limits = distributions(search_space(type(run.agent)))
+    # The sampler works on a copy in memory: a journal holds no trial without its result.
     study = create_study(sampler=TPESampler(seed=len(known), multivariate=True))
     study.add_trials(known)
     if not known:
-        study.enqueue_trial(present(run.algorithm, run.agent))
-    params = study.ask(distributions(knobs)).params
-    candidate = replace(run, agent=turned(run.algorithm, run.agent, params))
-    costs, ended = _train(candidate, [trial.intermediate_values for trial in known])
+        study.enqueue_trial(current_values(run.agent))
+    params = study.ask(limits).params
+    candidate = replace(run, agent=apply(run.agent, params))
+    costs, finished = _train(candidate, [trial.intermediate_values for trial in known])
     return create_trial(
         params=params,
-        distributions=distributions(knobs),
+        distributions=limits,
         intermediate_values=costs,
-        value=costs[max(costs)] if ended else None,
-        state=TrialState.COMPLETE if ended else TrialState.PRUNED,
+        value=costs[max(costs)] if finished else None,
+        state=TrialState.COMPLETE if finished else TrialState.PRUNED,
     )
 
 
 def _train(run: Run, others: Sequence[Mapping[int, float]]) -> tuple[dict[int, float], bool]:
-    """Validation costs by step, m/s, and whether the training came to its end."""
+    """Validation costs by step, m/s, and whether the training reached its end."""
 
-    def hopeless(lines: Sequence[Mapping[str, float]]) -> bool:
-        # Optuna's pruner compares the best so far, which is what all begin with
-        step, cost = int(lines[-1]["steps"]), -lines[-1]["return"]
-        theirs = [costs[step] for costs in others if step in costs]
-        return len(theirs) >= FEW and cost > float(np.median(theirs))
+    def above_median(curve: Sequence[Mapping[str, float]]) -> bool:
+        # Optuna's own pruner compares the best cost so far, which is that of the common start.
+        step, cost = int(curve[-1]["steps"]), -curve[-1]["return"]
+        earlier = [costs[step] for costs in others if step in costs]
+        return len(earlier) >= MIN_TRIALS_BEFORE_PRUNING and cost > float(np.median(earlier))
 
     with tempfile.TemporaryDirectory() as scratch:
         try:
-            outcome = train(run, Path(scratch) / "run", give_up=hopeless)
-        except ValueError:  # no more numbers in the network
+            outcome = train(run, Path(scratch) / "run", give_up=above_median)
+        except ConfigError:
+            raise
+        except ValueError:  # torch's error for a diverged network, whose outputs are NaN
             if not others:
                 raise
             outcome = "given up"
@@ -155,9 +166,9 @@ def _train(run: Run, others: Sequence[Mapping[int, float]]) -> tuple[dict[int, f
     return costs, outcome == "finished"
 
 
-def _to_yaml(run: Run, found: Found) -> str:
-    """A file of hyperparameters, with a comment that says how they were found."""
+def _to_yaml(run: Run, result: SearchResult) -> str:
+    """File of hyperparameters, with a comment on the search that gave them."""
     return commented(
-        asdict(found.agent),
-        f"{run.command or 'python -m agents tune'}\n{run.env}, {run.steps} steps; {found.in_words()}",
+        asdict(result.agent),
+        f"{run.command or 'python -m agents tune'}\n{run.env}, {run.steps} steps; {result.in_words()}",
     )

@@ -1,21 +1,22 @@
-"""Few burns: a planned transfer with mid-course corrections, and keeping by a deadband."""
+"""Few burns: a planned transfer with mid-course corrections, and station keeping by a deadband."""
 
 from typing import Literal
 
 import numpy as np
 
 from baselines.controllers.policy import AccelerationPolicy
+from baselines.controllers.search_space import CORRECTION, STATION_KEEPING, Parameter
 from baselines.design.guidance import Guidance
 from baselines.design.mid_course_correction import CorrectionSettings, MidCourse
 from baselines.design.phase_tables import by_steps_left
-from baselines.design.station_keeping import Keeping, KeepingSettings
+from baselines.design.station_keeping import StationKeeping, StationKeepingSettings
 from formation_env.numerics.arrays import Array, Observations
 from formation_env.settings import NonNegative, settings
 from formation_env.task.observation import observation_layout
 from formation_env.task.scenario import Scenario
 
 
-@settings
+@settings(renamed={"keeping": "station_keeping"})
 class DeadbandSettings:
     """Settings of `deadband`.
 
@@ -23,31 +24,34 @@ class DeadbandSettings:
         guidance: the transfers' path, see `baselines.design.guidance`.
         least_thrust: thrust of the path below this share of the limit is left out; corrections make up for it.
         correction: when the follower is brought back to it.
-        keeping: the hold's deadband.
+        station_keeping: the hold's deadband.
     """
 
     guidance: Literal["least_fuel", "two_impulse"] = "least_fuel"
     least_thrust: NonNegative = 0.02
     correction: CorrectionSettings = CorrectionSettings()
-    keeping: KeepingSettings = KeepingSettings()
+    station_keeping: StationKeepingSettings = StationKeepingSettings()
 
 
 class Deadband(AccelerationPolicy):
     """In a transfer the path's own thrust and corrections of the miss at its end; in a hold rare impulses."""
 
+    name = "deadband"
     Settings = DeadbandSettings
+    settings: DeadbandSettings
+    search_space = (Parameter(("least_thrust",), 1e-3, 0.5, transfer=True), *CORRECTION, *STATION_KEEPING)
+    color, symbol, dash = "#9A7B2C", "pentagon", "dash"
 
-    def __init__(self, scenario: Scenario, gains: DeadbandSettings) -> None:
-        super().__init__(scenario)
-        self.gains = gains
+    def __init__(self, scenario: Scenario, settings: DeadbandSettings) -> None:
+        super().__init__(scenario, settings)
         self._layout = observation_layout(scenario)
-        self._guidance = Guidance(scenario, gains.guidance)
-        self._course = MidCourse(scenario, gains.correction)
-        self._keeping = Keeping(scenario, gains.keeping)
+        self._guidance = Guidance(scenario, settings.guidance)
+        self._course = MidCourse(scenario, settings.correction)
+        self._station_keeping = StationKeeping(scenario, settings.station_keeping)
         model = scenario.filter_dynamics()
         to_accel = by_steps_left(scenario, lambda leg: np.linalg.pinv(model.steps(leg.start, leg.end).Gamma))
         own = (to_accel @ self._guidance.residuals[..., None])[..., 0]
-        least = gains.least_thrust * scenario.spacecraft.max_accel_m_s2
+        least = settings.least_thrust * scenario.spacecraft.max_accel_m_s2
         self._own_thrust = np.where(np.linalg.norm(own, axis=-1, keepdims=True) >= least, own, 0.0)
 
     def acceleration(self, observation: Observations) -> Array:
@@ -58,5 +62,5 @@ class Deadband(AccelerationPolicy):
         off = self._course.is_off(miss, observation, now.at)
         impulse = np.where(off[..., None], self._course.impulse(miss, now.at), 0.0)
         transfer = self._own_thrust[now.at] + impulse / self.scenario.dt_s
-        kept = self._keeping.acceleration(now.error, now.at)
-        return self.within_limit(np.where(in_hold[..., None], kept, transfer))
+        hold = self._station_keeping.acceleration(now.error, now.at)
+        return self.within_limit(np.where(in_hold[..., None], hold, transfer))

@@ -1,39 +1,23 @@
 """Linear quadratic regulator of the error state."""
 
 from functools import lru_cache
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Strict, model_validator
 
 from baselines.controllers.policy import AccelerationPolicy
+from baselines.controllers.search_space import REWEIGHTED_LQG, Parameter
 from baselines.controllers.weights import Weights
-from baselines.design.guidance import Guidance, Guide, Tracking, desired_path
+from baselines.design.guidance import Guidance, GuidanceName, Tracking, desired_path
 from baselines.design.phase_tables import by_steps_left, nominal_start
-from baselines.design.reweighted_lqg import PhaseDesign, reweighted_design
+from baselines.design.reweighted_lqg import PhaseDesign, ReweightedLQGSettings, reweighted_design
 from baselines.design.riccati import finite_horizon_gains, least_fuel_gains, stationary
 from formation_env.numerics.arrays import Array, Observations
 from formation_env.settings import Flag, NonNegative, Positive, settings
 from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import Leg
-
-Rounds = Annotated[int, Strict(), Field(ge=0, le=100)]
-
-
-@settings(renamed={"price_scale": "error_weight_scale"})
-class ReweightedLQGSettings:
-    """How the gains of least expected cost are found, see `baselines.design.reweighted_lqg`.
-
-    Attributes:
-        rounds: how often the weights are renewed.
-        floor: smallest thrust that is told from none, in units of max_accel_m_s2.
-        error_weight_scale: factor of the scenario's price of errors.
-    """
-
-    rounds: Rounds = 30
-    floor: Positive = 3e-4
-    error_weight_scale: Positive = 1.0
 
 
 @settings
@@ -56,7 +40,7 @@ class TransferSettings:
 
 @settings(renamed={"expected_cost": "reweighted_lqg"})
 class LQRSettings:
-    """Gains of `lqr`.
+    """Settings of `lqr`.
 
     Attributes:
         design: `reweighted_lqg`: a gain for each step, from the scenario's own cost; `weights`: from `hold` and
@@ -71,7 +55,7 @@ class LQRSettings:
     """
 
     design: Literal["reweighted_lqg", "weights"] = "reweighted_lqg"
-    guidance: Guide = "automatic"
+    guidance: GuidanceName = "automatic"
     feedforward: Flag = True
     deadband: NonNegative = 0.0
     reweighted_lqg: ReweightedLQGSettings = ReweightedLQGSettings()
@@ -90,18 +74,22 @@ class LQRSettings:
 class LQR(AccelerationPolicy):
     """u = -K (x_hat - x_d) + feedforward, by the filter's discrete model (Ma 2009, eq. 4.10)."""
 
-    Settings = LQRSettings
+    name = "lqr"
+    Settings: ClassVar[type[Any]] = LQRSettings
+    settings: LQRSettings
+    search_space: ClassVar[tuple[Parameter, ...]] = (*REWEIGHTED_LQG, Parameter(("deadband",), 0, 1, log=False))
+    proportional = True
+    color = "#0072B2"
 
-    def __init__(self, scenario: Scenario, gains: LQRSettings) -> None:
-        super().__init__(scenario)
-        self.gains = gains
-        self._guidance = Guidance(scenario, gains.guidance)
+    def __init__(self, scenario: Scenario, settings: LQRSettings) -> None:
+        super().__init__(scenario, settings)
+        self._guidance = Guidance(scenario, settings.guidance)
         model = scenario.filter_dynamics()
-        if gains.deadband > 0:
-            self._stiffness = by_steps_left(scenario, lambda leg: _design(scenario, gains)[leg.index].stiffness)
-        self.K = by_steps_left(scenario, lambda leg: phase_gains(scenario, leg, gains))
+        if settings.deadband > 0:
+            self._stiffness = by_steps_left(scenario, lambda leg: _design(scenario, settings)[leg.index].stiffness)
+        self.K = by_steps_left(scenario, lambda leg: phase_gains(scenario, leg, settings))
         to_accel = by_steps_left(scenario, lambda leg: np.linalg.pinv(model.steps(leg.start, leg.end).Gamma))
-        self._own_thrust = gains.feedforward * (to_accel @ self._guidance.residuals[..., None])[..., 0]
+        self._own_thrust = settings.feedforward * (to_accel @ self._guidance.residuals[..., None])[..., 0]
 
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
@@ -110,29 +98,28 @@ class LQR(AccelerationPolicy):
         return np.where(self._pays(acceleration, now)[..., None], acceleration, 0.0)
 
     def _pays(self, acceleration: Array, now: Tracking) -> NDArray[np.bool_]:
-        """Whether the first bit of an acceleration (..., 3) takes off more from the cost to come than the deadband."""
-        if self.gains.deadband == 0:
+        """Whether an acceleration (..., 3) reduces the cost to come, per delta-v, by more than the deadband."""
+        if self.settings.deadband == 0:
             return np.ones(acceleration.shape[:-1], bool)
         slope = (self._stiffness[now.at] @ acceleration[..., None])[..., 0]
-        return np.asarray(np.linalg.norm(slope, axis=-1) > self.gains.deadband * self.scenario.dt_s)
+        return np.asarray(np.linalg.norm(slope, axis=-1) > self.settings.deadband * self.scenario.dt_s)
 
 
-def phase_gains(scenario: Scenario, leg: Leg, gains: LQRSettings) -> Array:
+def phase_gains(scenario: Scenario, leg: Leg, settings: LQRSettings) -> Array:
     """Gains (steps, 3, 6) of a phase, from its beginning on."""
-    if gains.design == "reweighted_lqg":
-        return _design(scenario, gains)[leg.index].gains
-    hold = _regulator(scenario, gains.hold)[leg.arrival : leg.end]
-    if gains.transfer.horizon == "infinite":
-        transfer = _regulator(scenario, gains.transfer.weights)[leg.start : leg.arrival]
+    if settings.design == "reweighted_lqg":
+        return _design(scenario, settings)[leg.index].gains
+    hold = _regulator(scenario, settings.hold)[leg.arrival : leg.end]
+    if settings.transfer.horizon == "infinite":
+        transfer = _regulator(scenario, settings.transfer.weights)[leg.start : leg.arrival]
     else:
-        transfer = transfer_gains(scenario, leg, gains.guidance, gains.transfer)
+        transfer = transfer_gains(scenario, leg, settings.guidance, settings.transfer)
     return np.concatenate([transfer, hold])
 
 
-def _design(scenario: Scenario, gains: LQRSettings) -> tuple[PhaseDesign, ...]:
+def _design(scenario: Scenario, settings: LQRSettings) -> tuple[PhaseDesign, ...]:
     """The regulators of least expected cost."""
-    wanted = gains.reweighted_lqg
-    return reweighted_design(scenario, wanted.rounds, wanted.floor, wanted.error_weight_scale)
+    return reweighted_design(scenario, settings.reweighted_lqg)
 
 
 @lru_cache(maxsize=8)
@@ -147,7 +134,7 @@ def _regulator(scenario: Scenario, weights: Weights) -> Array:
 
 
 @lru_cache(maxsize=64)
-def transfer_gains(scenario: Scenario, leg: Leg, guidance: Guide, transfer: TransferSettings) -> Array:
+def transfer_gains(scenario: Scenario, leg: Leg, guidance: GuidanceName, transfer: TransferSettings) -> Array:
     """Gains (steps, 3, 6) of a leg's transfer, from its start on; the weights are renewed for the nominal start."""
     model = scenario.filter_dynamics().steps(leg.start, leg.arrival)
     start = nominal_start(scenario, leg) - desired_path(scenario, leg, guidance)[0]

@@ -1,15 +1,16 @@
-"""LQR about one plan: the cheapest undisturbed flight through all phases, which a cone program finds beforehand."""
+"""LQR about a nominal trajectory: the undisturbed flight of least cost through all phases, from a cone program."""
 
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from baselines.controllers.lqr import ReweightedLQGSettings
 from baselines.controllers.policy import AccelerationPolicy
+from baselines.controllers.search_space import REWEIGHTED_LQG
 from baselines.design.phase_tables import by_steps_left, read_instants
-from baselines.design.reweighted_lqg import reweighted_gains
+from baselines.design.reweighted_lqg import ReweightedLQGSettings, reweighted_gains
 from baselines.optimal import OptimalPlan, fuel_optimal
+from baselines.optimal.cone_solver import SOLVER
 from formation_env.dynamics.perturbations import Perturbations
 from formation_env.numerics.arrays import Array, Observations
 from formation_env.settings import settings
@@ -18,8 +19,8 @@ from formation_env.task.scenario import Scenario
 
 
 @settings(renamed={"expected_cost": "reweighted_lqg"})
-class LQRPlannedSettings:
-    """Gains of `lqr_nominal`.
+class LQRNominalSettings:
+    """Settings of `lqr_nominal`.
 
     Attributes:
         reweighted_lqg: how the feedback's gains are found.
@@ -34,19 +35,23 @@ class LQRNominal(AccelerationPolicy):
     `lqr` designs each phase by itself; the plan knows what comes after, and where it pays to be when a phase ends.
     """
 
-    Settings = LQRPlannedSettings
+    name = "lqr_nominal"
+    Settings = LQRNominalSettings
+    settings: LQRNominalSettings
+    search_space = REWEIGHTED_LQG
+    library = SOLVER
+    proportional = True
+    color, symbol, dash = "#6C5CE7", "hexagram", "dashdot"
 
-    def __init__(self, scenario: Scenario, gains: LQRPlannedSettings) -> None:
+    def __init__(self, scenario: Scenario, settings: LQRNominalSettings) -> None:
         """Plan, and find the gains.
 
         Raises:
             ModuleNotFoundError: Clarabel is not installed.
         """
-        super().__init__(scenario)
-        self.gains = gains
+        super().__init__(scenario, settings)
         self._layout = observation_layout(scenario)
-        plan, wanted = mission_plan(scenario), gains.reweighted_lqg
-        K = reweighted_gains(scenario, wanted.rounds, wanted.floor, wanted.error_weight_scale)
+        plan, K = mission_plan(scenario), reweighted_gains(scenario, settings.reweighted_lqg)
         self._path = by_steps_left(scenario, lambda leg: plan.states[leg.start : leg.end])
         self._thrust = by_steps_left(scenario, lambda leg: plan.controls[leg.start : leg.end])
         self._K = by_steps_left(scenario, lambda leg: K[leg.index])
@@ -68,7 +73,7 @@ def mission_plan(scenario: Scenario) -> OptimalPlan:
         ModuleNotFoundError: Clarabel is not installed.
     """
     filter_model = scenario.filter_model
-    believed = replace(
+    design_scenario = replace(
         scenario,
         dynamics=filter_model.dynamics,
         orbit=filter_model.orbit,
@@ -77,4 +82,4 @@ def mission_plan(scenario: Scenario) -> OptimalPlan:
         ),
         perturbations=Perturbations(),
     )
-    return fuel_optimal(believed)
+    return fuel_optimal(design_scenario)

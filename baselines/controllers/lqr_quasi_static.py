@@ -6,8 +6,9 @@ from typing import Literal
 import numpy as np
 
 from baselines.controllers.policy import AccelerationPolicy
+from baselines.controllers.search_space import REGULATOR
 from baselines.controllers.weights import Weights
-from baselines.design.guidance import Guidance, Guide, desired_states
+from baselines.design.guidance import Guidance, GuidanceName, desired_states
 from baselines.design.phase_tables import by_steps_left
 from baselines.design.riccati import continuous_gain, integrate_tracking
 from formation_env.dynamics import get_dynamics
@@ -19,8 +20,8 @@ from formation_env.task.schedule import Leg, legs
 
 
 @settings
-class LQRTrackingSettings:
-    """Gains of `lqr_quasi_static`.
+class LQRQuasiStaticSettings:
+    """Settings of `lqr_quasi_static`.
 
     Attributes:
         guidance: the desired path, see `baselines.design.guidance`.
@@ -30,7 +31,7 @@ class LQRTrackingSettings:
         transfer: weights in transfer.
     """
 
-    guidance: Guide = "least_cost"
+    guidance: GuidanceName = "least_cost"
     feedforward: Literal["quasi_static", "integrated"] = "quasi_static"
     hold: Weights = Weights(control_s2=(0.5, 0.5, 0.5))
     transfer: Weights = Weights(control_s2=(0.5, 0.5, 0.5))
@@ -39,13 +40,17 @@ class LQRTrackingSettings:
 class LQRQuasiStatic(AccelerationPolicy):
     """u = -R^-1 B' P x + R^-1 B' g with C = I (Ma 2009, eq. 4.17-4.19), by the filter's continuous model."""
 
-    Settings = LQRTrackingSettings
+    name = "lqr_quasi_static"
+    Settings = LQRQuasiStaticSettings
+    settings: LQRQuasiStaticSettings
+    search_space = REGULATOR
+    proportional = True
+    color, symbol, dash = "#3D9BD1", "square", "dash"
 
-    def __init__(self, scenario: Scenario, gains: LQRTrackingSettings) -> None:
-        super().__init__(scenario)
-        self.gains = gains
-        self._guidance = Guidance(scenario, gains.guidance)
-        parts = {leg: leg_gains(scenario, leg, gains) for leg in legs(scenario)}
+    def __init__(self, scenario: Scenario, settings: LQRQuasiStaticSettings) -> None:
+        super().__init__(scenario, settings)
+        self._guidance = Guidance(scenario, settings.guidance)
+        parts = {leg: leg_gains(scenario, leg, settings) for leg in legs(scenario)}
         self.K = by_steps_left(scenario, lambda leg: parts[leg][0])
         pull = by_steps_left(scenario, lambda leg: parts[leg][1])
         # u = pull - K x with x = y_d + e
@@ -57,15 +62,15 @@ class LQRQuasiStatic(AccelerationPolicy):
         return self._own_thrust[now.at] - (self.K[now.at] @ now.error[..., None])[..., 0]
 
 
-def leg_gains(scenario: Scenario, leg: Leg, gains: LQRTrackingSettings) -> tuple[Array, Array]:
+def leg_gains(scenario: Scenario, leg: Leg, settings: LQRQuasiStaticSettings) -> tuple[Array, Array]:
     """Gains R^-1 B' P (steps, 3, 6) and pulls R^-1 B' g (steps, 3), m/s^2, of a phase from its beginning on."""
-    desired = desired_states(scenario, leg, gains.guidance)
-    if gains.feedforward == "integrated":
-        return _integrate_leg(scenario, leg, gains, desired)
+    desired = desired_states(scenario, leg, settings.guidance)
+    if settings.feedforward == "integrated":
+        return _integrate_leg(scenario, leg, settings, desired)
     K, K_desired = (
         np.concatenate([transfer[leg.start : leg.arrival], hold[leg.arrival : leg.end]])
         for transfer, hold in zip(
-            tracking_gains(scenario, gains.transfer), tracking_gains(scenario, gains.hold), strict=True
+            tracking_gains(scenario, settings.transfer), tracking_gains(scenario, settings.hold), strict=True
         )
     )
     return K, (K_desired @ desired[:-1, :, None])[..., 0]
@@ -101,21 +106,24 @@ def continuous_model(scenario: Scenario) -> tuple[Array, Array]:
     ), control_matrix()
 
 
-def _integrate_leg(scenario: Scenario, leg: Leg, gains: LQRTrackingSettings, desired: Array) -> tuple[Array, Array]:
+def _integrate_leg(
+    scenario: Scenario, leg: Leg, settings: LQRQuasiStaticSettings, desired: Array
+) -> tuple[Array, Array]:
     """Gains and pulls of a phase by integration; after it the error is weighed as if it went on."""
-    (A, B), steps = continuous_model(scenario), np.arange(leg.start, leg.end + 1)
+    A, B = continuous_model(scenario)
+    times_s: Array = scenario.dt_s * np.arange(leg.start, leg.end + 1, dtype=float)
     if A.ndim != 2:
         model = scenario.filter_model.dynamics
         raise ConfigError(f"lqr_quasi_static.feedforward: integrated needs a model that does not vary, got {model}")
-    P = continuous_gain(A, B, gains.hold.Q(), gains.hold.R(scenario.orbit))[1]
+    P = continuous_gain(A, B, settings.hold.Q(), settings.hold.R(scenario.orbit))[1]
     g = P @ desired[-1]
     K, pull = np.zeros((leg.end - leg.start, 3, 6)), np.zeros((leg.end - leg.start, 3))
     arrival = leg.arrival - leg.start
-    for weights, first, last in ((gains.hold, arrival, len(K)), (gains.transfer, 0, arrival)):
+    for weights, first, last in ((settings.hold, arrival, len(K)), (settings.transfer, 0, arrival)):
         if first == last:
             continue
         R, part = weights.R(scenario.orbit), slice(first, last + 1)
-        P_on, g_on = integrate_tracking(A, B, weights.Q(), R, scenario.dt_s * steps[part], desired[part], P, g)
+        P_on, g_on = integrate_tracking(A, B, weights.Q(), R, times_s[part], desired[part], P, g)
         K[first:last] = np.linalg.solve(R, B.T @ P_on[:-1])
         pull[first:last] = np.linalg.solve(R, B.T @ g_on[:-1].T).T
         P, g = P_on[0], g_on[0]

@@ -1,4 +1,4 @@
-"""What any controller should beat: no thrust, and random thrust."""
+"""Reference policies that every controller should beat: no thrust, and random thrust."""
 
 from typing import Annotated
 
@@ -13,16 +13,16 @@ from formation_env.task.scenario import Scenario
 
 @settings
 class ZeroSettings:
-    """Coasting has no gains."""
+    """Coasting has no settings."""
 
 
 class Zero(AccelerationPolicy):
     """Coast."""
 
+    name = "zero"
     Settings = ZeroSettings
-
-    def __init__(self, scenario: Scenario, gains: ZeroSettings) -> None:
-        super().__init__(scenario)
+    is_reference = True
+    symbol, dash = "x", "dot"
 
     def acceleration(self, observation: Observations) -> Array:
         """Zeros (..., 3), m/s^2."""
@@ -31,7 +31,7 @@ class Zero(AccelerationPolicy):
 
 @settings
 class RandomSettings:
-    """Random thrust.
+    """Settings of `random`.
 
     Attributes:
         seed: of the policy's own random generator.
@@ -41,13 +41,17 @@ class RandomSettings:
 
 
 class Random(AccelerationPolicy):
-    """Uniform over the action space. It draws anew at each call, be it asked for deterministic actions or not."""
+    """Uniform over the action space, drawn anew at each call, even if deterministic actions are asked for."""
 
+    name = "random"
     Settings = RandomSettings
+    settings: RandomSettings
+    is_reference = True
+    symbol, dash = "cross", "dashdot"
 
-    def __init__(self, scenario: Scenario, gains: RandomSettings) -> None:
-        super().__init__(scenario)
-        self._generator = np.random.default_rng(gains.seed)
+    def __init__(self, scenario: Scenario, settings: RandomSettings) -> None:
+        super().__init__(scenario, settings)
+        self._generator = np.random.default_rng(settings.seed)
 
     def acceleration(self, observation: Observations) -> Array:
         """Uniform accelerations (..., 3) up to the limit of each axis, m/s^2."""

@@ -1,5 +1,6 @@
-"""Policies by name, and where their gains come from. To add a policy: a file, and a line in `POLICIES`."""
+"""Policies by name, and where their settings come from. To add a policy: a file, and its class in `POLICIES`."""
 
+import warnings
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -19,56 +20,77 @@ from formation_env.settings import ConfigError, build, load_yaml, nearest
 from formation_env.task.loading import ENV_IDS, config_folder, load_scenario, scenario_names
 from formation_env.task.scenario import Scenario
 
-POLICIES: Final[dict[str, type[Any]]] = {
-    "lqr": LQR,
-    "lqr_nominal": LQRNominal,
-    "mpc": MPC,
-    "lqr_finite": LQRFinite,
-    "lqr_quasi_static": LQRQuasiStatic,
-    "smc": SMC,
-    "two_impulse": TwoImpulsePolicy,
-    "deadband": Deadband,
-    "zero": Zero,
-    "random": Random,
-}
-"""Classes made with (scenario, gains), the gains being of the class's `Settings`."""
-SOLVER: Final = "clarabel"
-"""The library that solves cone programs, of the extra `optimal`."""
-PLANNING: Final = ("mpc", "lqr_nominal")
-"""Those that need it."""
-SLOW: Final = ("mpc",)
-"""Those that solve a program at each step: a hundred times as long as the others."""
-FLOORS: Final = ("zero", "random")
-"""Those that no policy should fall below."""
+_CLASSES: Final[tuple[type[AccelerationPolicy], ...]] = (
+    LQR,
+    LQRNominal,
+    MPC,
+    LQRFinite,
+    LQRQuasiStatic,
+    SMC,
+    TwoImpulsePolicy,
+    Deadband,
+    Zero,
+    Random,
+)
+POLICIES: Final[dict[str, type[AccelerationPolicy]]] = {each.name: each for each in _CLASSES}
+"""Classes made with (scenario, settings), the settings being of the class's `Settings`."""
+COARSE_THRUST: Final = 0.5
+"""Minimum thrust, in units of the limit, from which on a proportional policy is warned of: half its range is lost."""
+
+
+def register_policy(policy: type[AccelerationPolicy]) -> type[AccelerationPolicy]:
+    """Add a policy class from outside the package; may be used as a decorator.
+
+    Reports fly policies in other processes, so the class must be registered when its module is imported.
+
+    Raises:
+        ValueError: the name is taken by another class, or is missing.
+    """
+    name = getattr(policy, "name", None)
+    if not isinstance(name, str) or not hasattr(policy, "Settings"):
+        raise ValueError(f"{policy.__name__}: a policy class needs the attributes name and Settings")
+    if POLICIES.setdefault(name, policy) is not policy:
+        raise ValueError(f"{policy.__name__}: the name {name!r} is taken by {POLICIES[name].__name__}")
+    return policy
+
+
+def slow_policies() -> tuple[str, ...]:
+    """Names of the policies that solve a program at each step."""
+    return tuple(name for name, policy in POLICIES.items() if policy.slow)
+
+
+def reference_policies() -> tuple[str, ...]:
+    """Names of the reference policies that every controller should beat."""
+    return tuple(name for name, policy in POLICIES.items() if policy.is_reference)
 
 
 def make_policy(
-    name: str, scenario: str | Path | Scenario, gains: Mapping[str, Any] | str | Path | object | None = None
+    name: str, scenario: str | Path | Scenario, settings: Mapping[str, Any] | str | Path | object | None = None
 ) -> AccelerationPolicy:
     """A policy for a scenario.
 
     Args:
         name: one of `POLICIES`.
         scenario: a registered id, a scenario's name, the path of a YAML file, or a Scenario.
-        gains: the policy's settings: an object of its `Settings`, a mapping of its keys, or the path of a YAML file
-            with a section of the policy's name. By default those in configs/baselines: of the shipped scenario that
-            equals this one, else of default.yaml.
+        settings: the policy's settings: an object of its `Settings`, a mapping of its keys, or the path of a YAML file
+            with a section of the policy's name. By default those of `settings_path`.
 
     Raises:
-        ConfigError: no such policy or scenario, or wrong gains; one line that names file and key.
+        ConfigError: no such policy or scenario, or wrong settings; one line that names file and key.
     """
     kind = policy_class(name)
-    if gains is None:
-        gains = gains_path(scenario)
-    if isinstance(gains, (str, Path)):
-        gains = read_gains(name, Path(gains))
-    elif not isinstance(gains, kind.Settings):
-        gains = build(kind.Settings, gains, f"gains of {name}")
-    policy: AccelerationPolicy = kind(load_scenario(scenario), gains)
-    return policy
+    if settings is None:
+        settings = settings_path(scenario)
+    if isinstance(settings, (str, Path)):
+        settings = read_settings(name, Path(settings))
+    elif not isinstance(settings, kind.Settings):
+        settings = build(kind.Settings, settings, f"settings of {name}")
+    loaded = load_scenario(scenario)
+    _warn_of_coarse_thrust(kind, loaded)
+    return kind(loaded, settings)
 
 
-def policy_class(name: str) -> type[Any]:
+def policy_class(name: str) -> type[AccelerationPolicy]:
     """The class of a policy.
 
     Raises:
@@ -79,8 +101,29 @@ def policy_class(name: str) -> type[Any]:
     return POLICIES[name]
 
 
-def gains_path(scenario: str | Path | Scenario) -> Path:
-    """The gain file in configs/baselines for a scenario."""
+def _warn_of_coarse_thrust(kind: type[AccelerationPolicy], scenario: Scenario) -> None:
+    """Warn if most thrusts that a proportional policy commands are below the thruster's minimum."""
+    craft = scenario.spacecraft
+    if kind.proportional and craft.min_accel_m_s2 >= COARSE_THRUST * craft.max_accel_m_s2:
+        warnings.warn(
+            f"{kind.name}: commands thrust in proportion to the error, but spacecraft.min_accel_m_s2 = "
+            f"{craft.min_accel_m_s2:g} is near max_accel_m_s2 = {craft.max_accel_m_s2:g}, so small errors get none; "
+            "use mpc, deadband or two_impulse",
+            UserWarning,
+            stacklevel=3,
+        )
+
+
+def settings_path(scenario: str | Path | Scenario) -> Path:
+    """The settings file for a scenario.
+
+    For a scenario file `my.yaml` it is `my.baselines.yaml` beside it, if that exists. Else it is the file in
+    configs/baselines of the shipped scenario that equals this one, else default.yaml.
+    """
+    if not isinstance(scenario, Scenario):
+        beside = settings_beside(scenario)
+        if beside is not None and beside.is_file():
+            return beside
     folder = config_folder("baselines")
     name = ENV_IDS.get(scenario, scenario) if isinstance(scenario, str) else scenario
     if name not in scenario_names():
@@ -90,14 +133,23 @@ def gains_path(scenario: str | Path | Scenario) -> Path:
     return path if path.is_file() else folder / "default.yaml"
 
 
+def settings_beside(scenario: str | Path) -> Path | None:
+    """Settings file of a user's scenario file, `STEM.baselines.yaml` beside it; None for a name or an id."""
+    path = Path(scenario)
+    shipped = path.parent.resolve() == config_folder("scenarios").resolve()
+    if path.suffix not in (".yaml", ".yml") or shipped:
+        return None
+    return path.with_name(f"{path.stem}.baselines.yaml")
+
+
 @lru_cache(maxsize=1)
 def _shipped_scenarios() -> dict[str, Scenario]:
     """The scenarios that come with the package, by name."""
     return {name: load_scenario(name) for name in scenario_names()}
 
 
-def read_gains(name: str, path: Path) -> Any:
-    """Settings of a policy from a gain file; if it has no section of that name, the policy's defaults.
+def read_settings(name: str, path: Path) -> Any:
+    """Settings of a policy from a settings file; if it has no section of that name, the policy's defaults.
 
     Raises:
         ConfigError: the file is missing, or a section or key in it is wrong.
@@ -108,4 +160,4 @@ def read_gains(name: str, path: Path) -> Any:
     for section in sections:
         if section not in POLICIES:
             raise ConfigError(f"{path}: {section}: no policy of that name; {nearest(str(section), POLICIES)}")
-    return build(POLICIES[name].Settings, sections.get(name, {}), f"{path}: {name}")
+    return build(policy_class(name).Settings, sections.get(name, {}), f"{path}: {name}")

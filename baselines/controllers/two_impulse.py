@@ -1,50 +1,57 @@
-"""Transfers by two impulses, planned anew from the estimate; keeping by a deadband."""
+"""Transfers by two impulses, planned anew from the estimate; station keeping by a deadband."""
 
 import numpy as np
 
 from baselines.controllers.policy import AccelerationPolicy
+from baselines.controllers.search_space import CORRECTION, STATION_KEEPING, Parameter
 from baselines.design.guidance import Guidance
 from baselines.design.mid_course_correction import CorrectionSettings, MidCourse
-from baselines.design.station_keeping import Keeping, KeepingSettings
+from baselines.design.station_keeping import StationKeeping, StationKeepingSettings
 from formation_env.numerics.arrays import Array, Observations
 from formation_env.settings import NonNegative, settings
 from formation_env.task.observation import observation_layout
 from formation_env.task.scenario import Scenario
 
+_LEAST_BURN_STEPS = 1.01
+"""Latest beginning of the braking burn, in steps before the arrival; above 1, so that rounding cannot skip it."""
 
-@settings
+
+@settings(renamed={"keeping": "station_keeping"})
 class TwoImpulseSettings:
     """Settings of `two_impulse`.
 
     Attributes:
         correction: when the first impulse is given, and corrected on the way.
         braking: share of the second impulse's burn that lies before the arrival.
-        keeping: the hold's deadband.
+        station_keeping: the hold's deadband.
     """
 
     correction: CorrectionSettings = CorrectionSettings()
     braking: NonNegative = 0.5
-    keeping: KeepingSettings = KeepingSettings()
+    station_keeping: StationKeepingSettings = StationKeepingSettings()
 
 
 class TwoImpulsePolicy(AccelerationPolicy):
     """In a transfer the impulse that leads to the goal, later the one that stops there; each as a burn at the limit.
 
-    It has no plan in memory: the estimate tells what the arrival would be like, so what an impulse is still to do.
+    It has no plan in memory: the estimate's zero-effort miss gives what is left of an impulse.
     """
 
+    name = "two_impulse"
     Settings = TwoImpulseSettings
+    settings: TwoImpulseSettings
+    search_space = (*CORRECTION, Parameter(("braking",), 0, 1.5, log=False, transfer=True), *STATION_KEEPING)
+    color, symbol = "#CC79A7", "triangle-down"
 
-    def __init__(self, scenario: Scenario, gains: TwoImpulseSettings) -> None:
-        super().__init__(scenario)
-        self.gains = gains
+    def __init__(self, scenario: Scenario, settings: TwoImpulseSettings) -> None:
+        super().__init__(scenario, settings)
         self._layout = observation_layout(scenario)
         self._guidance = Guidance(scenario, "automatic")
-        self._course = MidCourse(scenario, gains.correction)
-        self._keeping = Keeping(scenario, gains.keeping)
+        self._course = MidCourse(scenario, settings.correction)
+        self._station_keeping = StationKeeping(scenario, settings.station_keeping)
 
     def acceleration(self, observation: Observations) -> Array:
-        """Accelerations (..., 3), m/s^2, along the wanted impulse even at the limit."""
+        """Accelerations (..., 3), m/s^2, along the impulse even at the limit."""
         now = self._guidance.track(observation)
         in_hold = self._layout.scalar(observation, "in_hold") > 0.5
         arrival = self._layout.state(observation, "zero_effort_miss")
@@ -52,11 +59,10 @@ class TwoImpulsePolicy(AccelerationPolicy):
         off = self._course.is_off(arrival[..., :3], observation, now.at)
         brakes = self._layout.time_to_arrival_s(observation) <= self._braking_s(arrival[..., 3:])
         transfer = np.where(brakes[..., None], -arrival[..., 3:], np.where(off[..., None], first, 0.0))
-        wanted = transfer / self.scenario.dt_s
-        kept = self._keeping.acceleration(now.error, now.at)
-        return self.within_limit(np.where(in_hold[..., None], kept, wanted))
+        hold = self._station_keeping.acceleration(now.error, now.at)
+        return self.within_limit(np.where(in_hold[..., None], hold, transfer / self.scenario.dt_s))
 
     def _braking_s(self, velocity_m_s: Array) -> Array:
         """How long before the arrival (...) the burn against a velocity (..., 3) begins, s; at least a step."""
         burn_s = np.abs(velocity_m_s).max(axis=-1) / self._max_accel_m_s2
-        return np.maximum(self.gains.braking * burn_s, 1.01 * self.scenario.dt_s)
+        return np.asarray(np.maximum(self.settings.braking * burn_s, _LEAST_BURN_STEPS * self.scenario.dt_s))

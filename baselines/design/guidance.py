@@ -33,10 +33,16 @@ from formation_env.task.observation import observation_layout
 from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import Leg, leg_reference, legs
 
-Guide = Literal["automatic", "straight_line", "two_impulse", "hohmann", "least_fuel", "least_cost"]
+GuidanceName = Literal["automatic", "straight_line", "two_impulse", "hohmann", "least_fuel", "least_cost"]
 
 _ARRIVAL_WEIGHT = 1e9
-"""Of the planned path's error at the arrival, against its acceleration in the thesis's units: nearly a constraint."""
+"""Weight of the least-fuel path's arrival error over that of its acceleration, in the thesis's units: nearly exact."""
+_PATH_THRUST_SHARE = 0.9
+"""Share of the thrust limit that the least-fuel path may take; the rest is left to the feedback about it."""
+_PATH_ROUNDS = 30
+"""Reweighting rounds of the least-fuel path, as many as the regulators use by default."""
+_PATH_FLOOR = 1e-3
+"""Smallest burn of the least-fuel path that is told from none, in units of its limit."""
 _SAME_PLANE_M = 1e-3
 """Amplitude of a motion across the plane that rounding may leave, m."""
 
@@ -62,9 +68,9 @@ class Guidance:
         residuals: what the filter's model lacks to go along the desired path by itself over the next step, likewise.
     """
 
-    def __init__(self, scenario: Scenario, guide: Guide) -> None:
+    def __init__(self, scenario: Scenario, guidance: GuidanceName) -> None:
         self._layout, self._dt_s = observation_layout(scenario), scenario.dt_s
-        paths = {leg: desired_states(scenario, leg, guide) for leg in legs(scenario)}
+        paths = {leg: desired_states(scenario, leg, guidance) for leg in legs(scenario)}
         self.desired = by_steps_left(scenario, lambda leg: paths[leg])
         self.residuals = by_steps_left(scenario, lambda leg: _residual(scenario, leg, paths[leg]))
         self._offsets = self.desired - by_steps_left(scenario, lambda leg: _reference(scenario, leg))
@@ -85,9 +91,9 @@ def _reference(scenario: Scenario, leg: Leg) -> Array:
     return leg_reference(scenario, leg, np.arange(leg.start, leg.end + 1))
 
 
-def desired_states(scenario: Scenario, leg: Leg, guide: Guide) -> Array:
+def desired_states(scenario: Scenario, leg: Leg, guidance: GuidanceName) -> Array:
     """Desired states (steps + 1, 6) of a phase: the path, and where it ends the reference."""
-    path = desired_path(scenario, leg, guide)
+    path = desired_path(scenario, leg, guidance)
     return np.concatenate([path, _reference(scenario, leg)[len(path) :]])
 
 
@@ -97,11 +103,11 @@ def _residual(scenario: Scenario, leg: Leg, desired: Array) -> Array:
     return desired[1:] - (model.Phi @ desired[:-1, :, None])[..., 0] - model.delta
 
 
-def desired_path(scenario: Scenario, leg: Leg, guide: Guide) -> Array:
+def desired_path(scenario: Scenario, leg: Leg, guidance: GuidanceName) -> Array:
     """Desired states of a phase from its beginning on; where they end, the reference takes over."""
-    if leg.arrival == leg.start and guide != "least_cost":
+    if leg.arrival == leg.start and guidance != "least_cost":
         return transfer_reference(scenario, leg)
-    return PATHS[guide](scenario, leg)
+    return PATHS[guidance](scenario, leg)
 
 
 def straight_line(scenario: Scenario, leg: Leg) -> Array:
@@ -174,8 +180,8 @@ def least_fuel_path(scenario: Scenario, leg: Leg) -> Array:
     start = start_error(scenario, leg)
     R = np.tile(np.eye(3) / n**4, (leg.arrival - leg.start, 1, 1))
     terminal = _ARRIVAL_WEIGHT * np.diag([1, 1, 1, n**-2, n**-2, n**-2])
-    limit = 0.9 * scenario.spacecraft.max_accel_m_s2
-    gains = least_fuel_gains(model.Phi, model.Gamma, R, terminal, start, limit, rounds=30, floor=1e-3)
+    limit = _PATH_THRUST_SHARE * scenario.spacecraft.max_accel_m_s2
+    gains = least_fuel_gains(model.Phi, model.Gamma, R, terminal, start, limit, _PATH_ROUNDS, _PATH_FLOOR)
     path = transfer_reference(scenario, leg) + closed_loop(model.Phi, model.Gamma, gains, start)[0]
     path[-1] = leg_reference(scenario, leg, np.array(leg.arrival))
     path.setflags(write=False)

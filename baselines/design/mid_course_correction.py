@@ -14,6 +14,9 @@ from formation_env.task.observation import SIGMA_DECADES, SIGMA_UNIT_POS_M, SIGM
 from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import Leg
 
+_NO_LEVERAGE_S = 1e-9
+"""Leverage that stands in for 0, to divide by where the quotient is not used, s."""
+
 
 @settings
 class CorrectionSettings:
@@ -31,8 +34,8 @@ class CorrectionSettings:
 class MidCourse:
     """Predictions and corrections of a scenario's transfers, looked up by phase and steps left."""
 
-    def __init__(self, scenario: Scenario, gains: CorrectionSettings) -> None:
-        self._gains, self._layout = gains, observation_layout(scenario)
+    def __init__(self, scenario: Scenario, settings: CorrectionSettings) -> None:
+        self._settings, self._layout = settings, observation_layout(scenario)
         self._coast = by_steps_left(scenario, lambda leg: to_arrival(scenario, leg))
         self._aim = by_steps_left(scenario, lambda leg: aims(scenario, leg))
 
@@ -47,7 +50,7 @@ class MidCourse:
         return impulse
 
     def is_off(self, miss_m: Array, observation: NDArray[np.floating], at: Instants) -> NDArray[np.bool_]:
-        """Whether a predicted miss (..., 3), m, is more than the filter may just imagine."""
+        """Whether a predicted miss (..., 3), m, stands out from the uncertainty of its prediction."""
         Phi = self._coast[at]
         sigma_pos_m, sigma_vel_m_s = (
             sigmas(self._layout.scalar(observation, "sigma_pos"), SIGMA_UNIT_POS_M),
@@ -57,19 +60,19 @@ class MidCourse:
             sigma_pos_m * np.linalg.norm(Phi[..., :3, :3], axis=(-2, -1)),
             sigma_vel_m_s * np.linalg.norm(Phi[..., :3, 3:], axis=(-2, -1)),
         )
-        bound = np.maximum(self._gains.miss_m, self._gains.miss_sigmas * spread)
+        bound = np.maximum(self._settings.miss_m, self._settings.miss_sigmas * spread)
         return np.asarray(np.linalg.norm(miss_m, axis=-1) > bound)
 
 
 def sigmas(shown: Array, unit: float) -> Array:
     """A sigma from what the observation shows of it."""
-    return unit * 10.0 ** (SIGMA_DECADES * shown)
+    return np.asarray(unit * 10.0 ** (SIGMA_DECADES * shown))
 
 
 def to_arrival(scenario: Scenario, leg: Leg) -> Array:
     """Phi from each instant of a transfer to its arrival (steps, 6, 6)."""
     Phi = scenario.filter_dynamics().steps(leg.start, leg.arrival).from_start().Phi
-    return Phi[-1] @ np.linalg.inv(Phi[:-1])
+    return np.asarray(Phi[-1] @ np.linalg.inv(Phi[:-1]))
 
 
 def aims(scenario: Scenario, leg: Leg) -> Array:
@@ -77,5 +80,5 @@ def aims(scenario: Scenario, leg: Leg) -> Array:
     time_s = scenario.dt_s * np.arange(leg.arrival - leg.start, 0, -1.0)
     least_s = LEAST_LEVERAGE * np.minimum(time_s, 1 / scenario.orbit.mean_motion_rad_s)
     U, leverage_s, Vt = np.linalg.svd(to_arrival(scenario, leg)[:, :3, 3:])
-    inverse = np.where(leverage_s > least_s[:, None], 1 / np.maximum(leverage_s, 1e-9), 0.0)
+    inverse = np.where(leverage_s > least_s[:, None], 1 / np.maximum(leverage_s, _NO_LEVERAGE_S), 0.0)
     return np.asarray(Vt.swapaxes(-1, -2) @ (inverse[..., None] * U.swapaxes(-1, -2)))

@@ -1,4 +1,4 @@
-"""Phases on the clock, as the policies look things up: by phase and by steps left to its end."""
+"""Tables that policies look up by phase and by steps left to the phase's end."""
 
 from collections.abc import Callable
 
@@ -26,8 +26,8 @@ def read_instants(observation: NDArray[np.floating], layout: ObservationLayout, 
     return layout.phase(observation), steps_left.astype(np.intp)
 
 
-def by_steps_left(scenario: Scenario, values: Callable[[Leg], Array]) -> Array:
-    """A table (phases, steps left, ...) of what a policy needs at each instant; 0 where there is nothing.
+def by_steps_left(scenario: Scenario, values: Callable[[Leg], NDArray[np.floating]]) -> Array:
+    """Tabulate values (phases, steps left, ...) of each instant; 0 where a phase has none.
 
     Args:
         scenario: what is flown.

@@ -1,9 +1,9 @@
 """Gains of every step of a phase from the scenario's own cost, by iteratively reweighted LQG.
 
-The return counts |u| and |e|, not their squares. With weights 1 / rms |u_k| and price / rms |e_k| of the round before,
-a quadratic cost has the same sum, and its minimum moves towards the least E|u| and E|e| (Daubechies et al. 2010,
-doi 10.1002/cpa.20303, for sums without expectation). The rms values follow from the nominal start, its spread, and the
-noises, as if no measurement were lost.
+The return counts |u| and |e|, not their squares. With weights 1 / rms |u_k| and error weight / rms |e_k| of the round
+before, a quadratic cost has the same sum, and its minimum moves towards the least E|u| and E|e| (Daubechies et al.
+2010, doi 10.1002/cpa.20303, for sums without expectation). The rms values follow from the nominal start, its spread,
+and the noises, as if no measurement were lost.
 
 Legend: Phi, Gamma model; K gain (the filter's in `knowledge`); P covariance of the estimate's error, X of the estimate;
 S innovation covariance.
@@ -11,9 +11,10 @@ S innovation covariance.
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final
+from typing import Annotated, Final
 
 import numpy as np
+from pydantic import Field, Strict
 
 from baselines.design.phase_tables import start_error
 from baselines.design.riccati import OVERLOAD, time_varying_regulator
@@ -22,8 +23,9 @@ from formation_env.dynamics.base import DiscreteModel
 from formation_env.navigation.filter_settings import process_noise_covariance
 from formation_env.numerics.arrays import Array
 from formation_env.numerics.jit import compiled_loop
+from formation_env.settings import Positive, settings
 from formation_env.task.scenario import Scenario
-from formation_env.task.schedule import Leg, legs
+from formation_env.task.schedule import Leg, legs, score_table
 
 FIRST_ERROR_M: Final = 100.0
 """Position error that the first round expects everywhere."""
@@ -33,7 +35,7 @@ ERROR_FLOOR_M: Final = 0.01
 
 @dataclass(frozen=True)
 class Knowledge:
-    """What the filter will know, whatever the controls are.
+    """Covariances of the filter, which do not depend on the controls.
 
     Attributes:
         missed: covariances of the estimate's error just after each measurement (steps + 1, 6, 6).
@@ -42,6 +44,11 @@ class Knowledge:
 
     missed: Array
     learned: Array
+
+    def during(self, leg: Leg) -> "Knowledge":
+        """The covariances at a phase's instants, its start and its end included."""
+        instants = slice(leg.start, leg.end + 1)
+        return Knowledge(self.missed[instants], self.learned[instants])
 
 
 def knowledge(scenario: Scenario, model: DiscreteModel) -> Knowledge:
@@ -126,34 +133,39 @@ class PhaseDesign:
     stiffness: Array
 
 
-def reweighted_gains(
-    scenario: Scenario, rounds: int = 30, floor: float = 3e-4, error_weight_scale: float = 1.0
-) -> tuple[Array, ...]:
+@settings(renamed={"price_scale": "error_weight_scale"})
+class ReweightedLQGSettings:
+    """How the regulators are found.
+
+    Attributes:
+        rounds: number of reweighting rounds after the first design.
+        floor: smallest thrust that is told from none, in units of max_accel_m_s2; it keeps all weights finite.
+        error_weight_scale: factor of the scenario's error weight.
+    """
+
+    rounds: Annotated[int, Strict(), Field(ge=0, le=100)] = 30
+    floor: Positive = 3e-4
+    error_weight_scale: Positive = 1.0
+
+
+DEFAULTS: Final = ReweightedLQGSettings()
+
+
+def reweighted_gains(scenario: Scenario, settings: ReweightedLQGSettings = DEFAULTS) -> tuple[Array, ...]:
     """Gains (steps, 3, 6) of each phase, see `reweighted_design`."""
-    return tuple(design.gains for design in reweighted_design(scenario, rounds, floor, error_weight_scale))
+    return tuple(design.gains for design in reweighted_design(scenario, settings))
 
 
 @lru_cache(maxsize=32)
-def reweighted_design(
-    scenario: Scenario, rounds: int = 30, floor: float = 3e-4, error_weight_scale: float = 1.0
-) -> tuple[PhaseDesign, ...]:
+def reweighted_design(scenario: Scenario, settings: ReweightedLQGSettings = DEFAULTS) -> tuple[PhaseDesign, ...]:
     """The regulator of each phase.
 
-    Each phase is judged by itself; its start is the nominal one with the second moment that the phase before ends with.
-
-    Args:
-        scenario: what is flown.
-        rounds: how often the weights are renewed.
-        floor: smallest thrust that is told from none, in units of max_accel_m_s2.
-        error_weight_scale: factor of the scenario's price of errors.
+    Each phase is scored by itself; its start is the nominal one with the second moment that the phase before ends with.
     """
     known = knowledge(scenario, scenario.filter_dynamics())
     first, result = known.learned[0], []
     for leg in legs(scenario):
-        instants = slice(leg.start, leg.end + 1)
-        here = Knowledge(known.missed[instants], known.learned[instants])
-        start = start_error(scenario, leg)
-        design, first = _design(scenario, leg, start, first, here, rounds, floor, error_weight_scale)
+        design, first = _design(scenario, leg, first, known.during(leg), settings)
         for part in (design.gains, design.stiffness):
             part.setflags(write=False)
         result.append(design)
@@ -161,43 +173,28 @@ def reweighted_design(
 
 
 def _design(
-    scenario: Scenario,
-    leg: Leg,
-    start: Array,
-    first: Array,
-    known: Knowledge,
-    rounds: int,
-    floor: float,
-    error_weight_scale: float,
+    scenario: Scenario, leg: Leg, first: Array, known: Knowledge, settings: ReweightedLQGSettings
 ) -> tuple[PhaseDesign, Array]:
     """The regulator of a phase, and the second moment (6, 6) of the estimated error at its end."""
     limit, position = scenario.spacecraft.max_accel_m_s2, np.diag([1.0, 1, 1, 0, 0, 0])
-    model = scenario.filter_dynamics().steps(leg.start, leg.end)
-    price = error_weight_scale * _error_price(scenario, leg)
-    control_weight, error_weight = np.full(leg.end - leg.start, scenario.dt_s / limit), price / FIRST_ERROR_M
-    for _ in range(rounds + 1):
+    start, model = start_error(scenario, leg), scenario.filter_dynamics().steps(leg.start, leg.end)
+    weight, cost = settings.error_weight_scale * error_weights(scenario, leg), scenario.reward.cost()
+    control_weight, error_weight = np.full(leg.end - leg.start, scenario.dt_s / limit), weight / FIRST_ERROR_M
+    for _ in range(settings.rounds + 1):
         Q, R = error_weight[:, None, None] * position, control_weight[:, None, None] * np.eye(3)
         gains, stiffness = time_varying_regulator(model.Phi, model.Gamma, Q, R)
         seen = spread(model, gains, start, first, known)
         overload = 1 + OVERLOAD * np.maximum(seen.peak / limit - 1, 0)
-        control_weight = np.sqrt(control_weight * scenario.dt_s * overload / (seen.control + floor * limit))
-        error_weight = np.sqrt(error_weight * price * _steepness(scenario, seen.error))
+        control_weight = np.sqrt(control_weight * scenario.dt_s * overload / (seen.control + settings.floor * limit))
+        error_weight = np.sqrt(error_weight * weight * cost.per_square(seen.error, ERROR_FLOOR_M))
     return PhaseDesign(gains, stiffness), seen.last
 
 
-def _error_price(scenario: Scenario, leg: Leg) -> Array:
-    """Price (steps + 1,) of an error at each instant of a phase, (m/s) per m."""
-    reward = scenario.reward
-    in_hold = np.arange(leg.start, leg.end + 1) > leg.arrival
-    weight = np.where(in_hold, reward.error_weight, reward.transfer_error_weight)
-    return weight * scenario.dt_s / scenario.hold_s
-
-
-def _steepness(scenario: Scenario, error_m: Array) -> Array:
-    """Cost per price and squared error (...), 1/m."""
-    if scenario.reward.error_cost == "quadratic":
-        return np.full(error_m.shape, 1 / scenario.reward.quadratic_scale_m)
-    return 1 / (error_m + ERROR_FLOOR_M)
+def error_weights(scenario: Scenario, leg: Leg) -> Array:
+    """Weights (steps + 1,) of the errors that a phase scores, (m/s) per m; 0 at its start, which it does not score."""
+    scores = score_table(scenario)
+    here = slice(leg.start, leg.end + 1)
+    return np.where(scores.leg[here] == leg.index, scores.error_weight[here], 0.0)
 
 
 def episode_scatter(scenario: Scenario) -> tuple[Array, Array]:
@@ -209,8 +206,7 @@ def episode_scatter(scenario: Scenario) -> tuple[Array, Array]:
     known = knowledge(scenario, scenario.filter_dynamics())
     first, error, control = known.learned[0], np.zeros(scenario.num_steps + 1), np.zeros(scenario.num_steps)
     for leg, gains in zip(legs(scenario), reweighted_gains(scenario), strict=True):
-        instants = slice(leg.start, leg.end + 1)
-        here = Knowledge(known.missed[instants], known.learned[instants])
-        seen = spread(scenario.filter_dynamics().steps(leg.start, leg.end), gains, np.zeros(6), first, here)
-        error[instants], control[leg.start : leg.end], first = seen.error, seen.control, seen.last
+        model = scenario.filter_dynamics().steps(leg.start, leg.end)
+        seen = spread(model, gains, np.zeros(6), first, known.during(leg))
+        error[leg.start : leg.end + 1], control[leg.start : leg.end], first = seen.error, seen.control, seen.last
     return error, control

@@ -7,6 +7,7 @@ position errors over the steps to come if the follower coasts, e~' M e~.
 from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from baselines.design.phase_tables import Instants, by_steps_left
@@ -16,11 +17,11 @@ from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import Leg, leg_reference
 
 _DAMPING = 1e-3
-"""Of an impulse, against the squared leverage that it has over a whole window; lest short windows ask for much."""
+"""Weight of an impulse over its squared leverage in a whole window; it keeps the impulses of short windows small."""
 
 
 @settings(renamed={"look_ahead_periods": "look_ahead_orbits"})
-class KeepingSettings:
+class StationKeepingSettings:
     """A deadband on the predicted error.
 
     Attributes:
@@ -34,11 +35,11 @@ class KeepingSettings:
     least_reduction: Annotated[Real, Field(ge=0, lt=1)] = 0.3
 
 
-class Keeping:
+class StationKeeping:
     """A memoryless law of holds: from the estimated error to a rare impulse."""
 
-    def __init__(self, scenario: Scenario, gains: KeepingSettings) -> None:
-        self._gains, self._window = gains, max(1, scenario.steps(gains.look_ahead_orbits))
+    def __init__(self, scenario: Scenario, settings: StationKeepingSettings) -> None:
+        self._settings, self._window = settings, max(1, scenario.steps(settings.look_ahead_orbits))
         self._A = by_steps_left(scenario, lambda leg: error_steps(scenario, leg))
         # the impulse acts over the step, so what counts is the sum from the step's end on
         self._M = by_steps_left(scenario, lambda leg: coasting_sums(error_steps(scenario, leg), self._window)[1:])
@@ -59,8 +60,8 @@ class Keeping:
         impulse = -np.linalg.solve(stiffness + self._damping(Gamma), slope[..., None])[..., 0]
         gained = -2 * (slope * impulse).sum(axis=-1) - (impulse * _times(stiffness, impulse)).sum(axis=-1)
         left = np.clip(at[1] - 1, 1, self._window)
-        fires = (before > left * self._gains.band_m**2) & (
-            before - gained < (1 - self._gains.least_reduction) ** 2 * before
+        fires = (before > left * self._settings.band_m**2) & (
+            before - gained < (1 - self._settings.least_reduction) ** 2 * before
         )
         return np.where(fires[..., None], impulse, 0.0)
 
@@ -72,7 +73,7 @@ class Keeping:
         return _DAMPING * reach * (speed.swapaxes(-1, -2) @ speed)
 
 
-def _times(matrix: Array, vector: Array) -> Array:
+def _times(matrix: Array, vector: NDArray[np.floating]) -> Array:
     product: Array = (matrix @ vector[..., None])[..., 0]
     return product
 

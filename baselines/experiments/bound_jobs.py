@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from baselines.controllers.registry import SOLVER
 from baselines.experiments.parallel import Progress
 from baselines.optimal import fuel_optimal
+from baselines.optimal.cone_solver import SOLVER
 from baselines.result_cache import remove_temporaries
 from formation_env.dynamics import NONLINEAR
 from formation_env.numerics.arrays import Array

@@ -1,8 +1,8 @@
 """Effort of a report: how many episodes and sweeps it flies."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from baselines.controllers.registry import FLOORS, SLOW
+from baselines.controllers.registry import reference_policies, slow_policies
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,5 +26,5 @@ class ReportOptions:
     sweep_bound_episodes: int = 2
     coarse: bool = True
     resume: bool = False
-    slow: tuple[str, ...] = SLOW
-    unswept: tuple[str, ...] = (*SLOW, *FLOORS)
+    slow: tuple[str, ...] = field(default_factory=slow_policies)
+    unswept: tuple[str, ...] = field(default_factory=lambda: (*slow_policies(), *reference_policies()))

@@ -4,29 +4,42 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from formation_env.evaluation.rollout import Policy
 from formation_env.numerics.arrays import Actions, Observations
 
 
 class SideBySide:
-    """Policies that fly equal shares of a batch's rows, in order; each keeps its own state."""
+    """Policies that fly equal shares of a batch's rows, in order; each keeps a state of its own."""
 
     def __init__(self, policies: Sequence[Policy]) -> None:
         self.policies = policies
 
     def predict(
-        self, observation: Observations, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> tuple[Actions, Any]:
-        """Actions (rows, 3) for observations (rows, SIZE), and the policies' states, one each."""
+        self,
+        observation: Observations,
+        state: Sequence[Any] | None = None,
+        episode_start: NDArray[np.bool_] | None = None,
+        deterministic: bool = True,
+    ) -> tuple[Actions, list[Any]]:
+        """Actions (rows, 3) for observations (rows, SIZE).
+
+        Args:
+            observation: (rows, SIZE).
+            state: of each policy, as the last call returned it; None before the first.
+            episode_start: whether a row's episode begins (rows,); each policy gets its share.
+            deterministic: handed to each policy.
+
+        Returns:
+            Actions (rows, 3), and the policies' new states.
+        """
         count = len(self.policies)
-        observations = np.split(observation, count)
-        starts = [None] * count if episode_start is None else np.split(np.asarray(episode_start), count)
+        shares = np.split(observation, count)
         states = [None] * count if state is None else state
-        found = [
-            policy.predict(own, before, start, deterministic)
-            for policy, own, before, start in zip(self.policies, observations, states, starts, strict=True)
+        starts = [None] * count if episode_start is None else np.split(np.asarray(episode_start), count)
+        results = [
+            policy.predict(share, state=own, episode_start=start, deterministic=deterministic)
+            for policy, share, own, start in zip(self.policies, shares, states, starts, strict=True)
         ]
-        actions = np.concatenate([action for action, _ in found])
-        after = [own for _, own in found]
-        return actions, None if all(own is None for own in after) else after
+        return np.concatenate([actions for actions, _ in results]), [own for _, own in results]

@@ -4,14 +4,21 @@ import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, is_dataclass
 from functools import cache, lru_cache
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Protocol
 
 from baselines import result_cache
 from baselines.controllers.policy import AccelerationPolicy
-from baselines.controllers.registry import PLANNING, POLICIES, SOLVER, gains_path, make_policy, policy_class, read_gains
+from baselines.controllers.registry import (
+    POLICIES,
+    make_policy,
+    policy_class,
+    read_settings,
+    settings_beside,
+    settings_path,
+)
 from formation_env.evaluation.rollout import Policy
+from formation_env.task.loading import load_scenario
 from formation_env.task.scenario import Scenario
 
 
@@ -34,16 +41,18 @@ class PolicyFactory(Protocol):
 
 @dataclass(frozen=True)
 class Classical:
-    """A policy of `POLICIES`, with the gains of the original scenario.
+    """A policy of `POLICIES`, with the settings of the original scenario.
 
     Attributes:
         name: of the policy.
+        files: scenarios and their settings files, for those that are read from a user's file.
 
     Raises:
         ConfigError: there is none of that name.
     """
 
     name: str
+    files: tuple[tuple[Scenario, Path], ...] = ()
 
     def __post_init__(self) -> None:
         policy_class(self.name)
@@ -53,31 +62,35 @@ class Classical:
         return make_policy(self.name, believed, self.settings(original))
 
     def settings(self, original: Scenario) -> Any:
-        """Its gains.
+        """Its settings.
 
         Raises:
-            ConfigError: the gain file is wrong.
+            ConfigError: the settings file is wrong.
         """
-        return _gains(self.name, gains_path(original))
+        given = next((path for scenario, path in self.files if scenario == original), None)
+        return _settings(self.name, given or settings_path(original))
 
 
-def classical(names: Sequence[str] = ()) -> dict[str, Classical]:
+def classical(names: Sequence[str] = (), environments: Sequence[str | Path] = ()) -> dict[str, Classical]:
     """Factories of classical policies.
 
     Args:
-        names: of the policies; by default all, without those whose solver is not installed.
+        names: of the policies; by default all whose libraries are installed.
+        environments: ids, names or files of the scenarios to fly, so that settings beside a user's file are found.
 
     Raises:
-        ConfigError: there is none of a name.
+        ConfigError: there is no policy of a name, or a scenario file is wrong.
     """
-    chosen = names or [name for name in POLICIES if name not in PLANNING or find_spec(SOLVER)]
-    return {name: Classical(name) for name in chosen}
+    chosen = names or [name for name, policy in POLICIES.items() if policy.is_available()]
+    beside = [each for each in environments if (path := settings_beside(each)) is not None and path.is_file()]
+    files = tuple((load_scenario(each), settings_path(each)) for each in beside)
+    return {name: Classical(name, files) for name in chosen}
 
 
 @lru_cache
-def _gains(name: str, path: Path) -> Any:
-    """A policy's settings from a gain file, which is read once."""
-    return read_gains(name, path)
+def _settings(name: str, path: Path) -> Any:
+    """A policy's settings from a file, which is read once."""
+    return read_settings(name, path)
 
 
 def describe(factory: PolicyFactory, original: Scenario) -> Any:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from baselines.controllers.registry import SOLVER
 from baselines.experiments import parallel
 from baselines.experiments.bound_jobs import Bounds, bound_jobs
 from baselines.experiments.cached_jobs import FOLDER, cached
@@ -18,6 +17,7 @@ from baselines.experiments.effort import ReportOptions
 from baselines.experiments.episodes import Episodes, episode_jobs
 from baselines.experiments.policy_factories import PolicyFactory
 from baselines.experiments.sweep import Point, Sweep, points
+from baselines.optimal.cone_solver import SOLVER
 from formation_env.evaluation.seeds import seeds
 from formation_env.numerics.arrays import Array
 from formation_env.settings import ConfigError

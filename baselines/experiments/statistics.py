@@ -114,9 +114,12 @@ class Results:
         return self.interval(policy, metric)[0]
 
     def best_of(self, metric: str) -> list[str]:
-        """The policies with the best mean of a metric, of those that flew all seeds; none if all are equal."""
+        """The policies with the best mean of a metric, of those that flew all seeds; none if no value is better."""
+        better = METRICS[metric].better
+        if better is None:
+            return []
         means = {name: self.mean(name, metric) for name in self.ranking if name not in self.partial}
-        pick = max if metric in ("return", "in_tolerance") else min
+        pick = max if better == "higher" else min
         top = pick(means.values())
         return [name for name, value in means.items() if value == top] if len(set(means.values())) > 1 else []
 

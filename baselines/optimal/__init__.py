@@ -1,4 +1,4 @@
-"""The least that an episode can cost, known all its noises: the yardstick of every policy."""
+"""Perfect-information lower bounds on an episode's cost, and the cone programs behind them and behind `mpc`."""
 
 from baselines.optimal.cost_ratio import CostRatio, cost_ratio
 from baselines.optimal.impulsive import ImpulsivePlan, impulsive_transfer

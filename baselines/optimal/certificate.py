@@ -1,16 +1,21 @@
-"""What a plan costs, and a proof that nothing costs less: both in plain arithmetic that trusts no solver.
+"""Cost of a plan, and a certificate that nothing costs less: both in plain arithmetic that trusts no solver.
 
-For any multipliers y_j, |e| >= y.e / price as long as |y| <= price. The cost is then at least a sum over the instants
-plus, for each step, the least of |u| dt + q.u within the thrust limit, where the adjoint q = Gamma' lambda is Lawden's
-primer vector (Lawden 1963, "Optimal Trajectories for Space Navigation"; times -dt): weak duality.
+For any multipliers y_j, w |e| >= y.e as long as |y| is at most the error weight w. The cost is then at least a sum over
+the instants plus, for each step, the least of |u| dt + q.u within the thrust limit, where the adjoint q = Gamma' lambda
+is Lawden's primer vector (Lawden 1963, "Optimal Trajectories for Space Navigation"; times -dt): weak duality.
 
 Legend: y multipliers, lambda adjoint state, q primer vector.
 """
+
+from typing import Final
 
 import numpy as np
 
 from baselines.optimal.problem import Problem
 from formation_env.numerics.arrays import Array
+
+_NO_LENGTH: Final = 1e-300
+"""Length that stands in for 0, to divide by."""
 
 
 def fly_plan(problem: Problem, controls: Array) -> Array:
@@ -29,8 +34,7 @@ def delta_v(problem: Problem, controls: Array) -> float:
 def plan_cost(problem: Problem, states: Array, controls: Array) -> float:
     """The environment's cost of a plan, m/s."""
     error = np.linalg.norm((states - problem.goal)[:, :3], axis=1)
-    shaped = problem.linear * error + problem.quadratic * error**2
-    return delta_v(problem, controls) + float(problem.price @ shaped)
+    return delta_v(problem, controls) + float(problem.error_weight @ problem.cost.of(error))
 
 
 def lower_bound(problem: Problem, multipliers: Array) -> float:
@@ -49,18 +53,18 @@ def lower_bound(problem: Problem, multipliers: Array) -> float:
 
 
 def _feasible(problem: Problem, multipliers: Array) -> tuple[Array, float]:
-    """The multipliers cut to what bounds the price of errors from below, and what a quadratic price takes off, m/s."""
+    """Multipliers cut to what bounds the cost of errors from below, and the conjugate of a quadratic cost, m/s."""
     y, met = multipliers.copy(), list(problem.met)
     y[:, 3:], conjugate = 0, 0.0
-    judged = problem.price > 0
-    y[~judged] = 0
-    if problem.linear:
-        # price |e| >= y.e if |y| <= price
+    weighted = problem.error_weight > 0
+    y[~weighted], weight = 0, problem.error_weight[weighted]
+    if problem.cost.linear:
+        # w |e| >= y.e if |y| <= w
         length = np.linalg.norm(y, axis=1)
-        y[judged] *= np.minimum(1, problem.price[judged] / np.maximum(length[judged], 1e-300))[:, None]
+        y[weighted] *= np.minimum(1, weight / np.maximum(length[weighted], _NO_LENGTH))[:, None]
     else:
-        # price c |e|^2 >= y.e - |y|^2 / (4 price c)
-        conjugate = float(((y[judged] ** 2).sum(axis=1) / (4 * problem.price[judged] * problem.quadratic)).sum())
+        # w c |e|^2 >= y.e - |y|^2 / (4 w c)
+        conjugate = float(((y[weighted] ** 2).sum(axis=1) / (4 * weight * problem.cost.quadratic)).sum())
     y[met] = multipliers[met]
     return y, conjugate
 

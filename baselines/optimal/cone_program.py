@@ -1,39 +1,85 @@
-"""The fuel optimum as a second-order cone program.
+"""A control problem with the environment's cost as a second-order cone program: for whole episodes and for horizons.
 
-The variables are what the thrust adds to the state after each step, the thrust, its length, and the length of the
-position error at each judged instant; a step couples neighbours only, so the program is sparse and its solution takes a
-time in proportion to the steps.
+    minimise  sum dt_j |(u_j, sigma_j)| + sum w_j (linear |(x_j - r_j, rho_j)| + quadratic |x_j - r_j|^2)
+    so that   x_(j+1) = F_j x_j + G_j u_j + d_j,   |u_j| <= limit_j along each axis,   x_m = goal_m at the instants met
+
+over blocks j of one or more steps, each of constant thrust. A block couples neighbours only, so the program is sparse
+and its solution takes a time in proportion to the blocks. sigma and rho are the expected scatter of thrust and position
+about the plan: where something scatters anyway, a little more costs next to nothing, as E|e + w| is flat at e = 0.
+
+Legend: F, G, d the model over a block; x states at the blocks' ends, u accelerations, t >= |(u, sigma)|,
+s >= |(x - r, rho)|. Variables in order: x (6 N), u (3 N), t (N), s (one for each error with a linear cost).
 """
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from baselines.optimal.cone_solver import UnreachableError, solve_cones
-from baselines.optimal.problem import Problem
+from baselines.optimal.cone_solver import EXACT, Cones, ConeSolver
 from formation_env.numerics.arrays import Array
+from formation_env.task.reward import ErrorCost
 
-LENGTH_M: Final = 1000.0
-"""Unit of positions in the program."""
-RATE_PER_S: Final = 1e-3
-"""Unit of velocities in it, over that of positions; about a mean motion."""
-_UNITS: Final = LENGTH_M * np.repeat([1.0, RATE_PER_S], 3)
-_LENGTH: Final = np.eye(4, 1)
-_VECTOR: Final = np.eye(4, 3, -1)
 
-IntArray = NDArray[np.intp]
+@dataclass(frozen=True)
+class ControlProblem:
+    """A control problem in N blocks.
+
+    Attributes:
+        F: transition matrices (N, 6, 6).
+        G: input matrices (N, 6, 3).
+        d: effects of the constant disturbance (N, 6).
+        duration_s: of the blocks (N,), s.
+        limit_m_s2: greatest acceleration along each axis (N,), m/s^2.
+        place_m: positions at the blocks' ends that errors are counted from (N, 3), m.
+        error_weight: weight of the error there (N,), (m/s) per m.
+        cost: cost of an error per unit of its weight.
+        error_scatter_m: rms scatter of the position about the plan there (N,), m; None is none anywhere.
+        thrust_scatter_m_s2: rms scatter of the acceleration in the blocks (N,), m/s^2; given along with the other.
+        met: blocks at whose ends the state must be the goal.
+        goal: states (met, 6), m and m/s.
+    """
+
+    F: Array
+    G: Array
+    d: Array
+    duration_s: Array
+    limit_m_s2: Array
+    place_m: Array
+    error_weight: Array
+    cost: ErrorCost
+    error_scatter_m: Array | None = None
+    thrust_scatter_m_s2: Array | None = None
+    met: tuple[int, ...] = ()
+    goal: Array | None = None
+
+
+@dataclass(frozen=True)
+class Units:
+    """Units of the program; the solver likes numbers near 1. That of the cost is accel_m_s2 * time_s.
+
+    Attributes:
+        length_m: of positions.
+        speed_m_s: of velocities.
+        accel_m_s2: of thrust in the cost.
+        time_s: of durations in the cost.
+    """
+
+    length_m: float
+    speed_m_s: float
+    accel_m_s2: float = 1.0
+    time_s: float = 1.0
 
 
 @dataclass(frozen=True)
 class Solution:
-    """What the solver found.
+    """A plan and the multipliers that prove it.
 
     Attributes:
-        controls: accelerations (steps, 3), m/s^2.
-        multipliers: (steps + 1, 6), m/s per m and per m/s, see `certificate`.
+        controls: accelerations (N, 3), m/s^2.
+        multipliers: of the errors from the start on (N + 1, 6), m/s per m and per m/s, see `certificate`.
     """
 
     controls: Array
@@ -41,116 +87,163 @@ class Solution:
 
 
 @dataclass(frozen=True)
-class _Rows:
-    """Rows A x + s = b of the program, with s in a cone."""
+class Plan:
+    """The solver's plan.
 
-    A: Any
-    b: Array
-
-
-def solve(problem: Problem) -> Solution:
-    """Solve a problem.
-
-    Raises:
-        ValueError: no thrust within the limit meets the states to be met.
-        ModuleNotFoundError: Clarabel is not installed.
+    Attributes:
+        cost_m_s: of the problem, m/s.
+        states: at the blocks' ends (N, 6), m and m/s.
+        controls: accelerations (N, 3), m/s^2.
+        solved: whether the solver reached its tolerance, or nearly so.
+        status: the solver's own word for how it ended.
+        z: multipliers of the program's rows, in its units.
     """
-    rows = [_motion(problem), _meeting(problem), _box(problem), _thrusts(problem), _errors(problem)]
-    P, cost = _objective(problem)
-    A, b = sparse.vstack([part.A for part in rows], format="csc"), np.concatenate([part.b for part in rows])
-    sizes = [len(part.b) for part in rows]
-    try:
-        x, z = solve_cones(P, cost, A, b, sizes[0] + sizes[1], sizes[2], (sizes[3] + sizes[4]) // 4)
-    except UnreachableError as error:
-        raise ValueError(
-            f"exact_arrival: no thrust of at most {problem.limit.max():g} m/s^2 along each axis meets the reference at "
-            f"the steps {list(problem.met)}"
-        ) from error
-    return _read(problem, x, z)
+
+    cost_m_s: float
+    states: Array
+    controls: Array
+    solved: bool
+    status: str
+    z: Array
 
 
-def _coned(problem: Problem) -> IntArray:
-    """Instants whose error's length is a variable: those with a linear price."""
-    return np.flatnonzero(problem.price * problem.linear)
+class ConeProgram:
+    """A problem's program, laid out once and solved for any number of starts, which change the right-hand side only."""
 
+    def __init__(self, problem: ControlProblem, units: Units, *, tolerance: float = EXACT) -> None:
+        """Lay out the matrices.
 
-def _beside(problem: Problem, states: Any = None, thrust: Any = None, length: Any = None, error: Any = None) -> Any:
-    """Columns of the variables side by side; those not given are zero."""
-    steps = len(problem.Phi)
-    widths, blocks = (6 * steps, 3 * steps, steps, len(_coned(problem))), (states, thrust, length, error)
-    height = next(block.shape[0] for block in blocks if block is not None)
-    filled = [sparse.csr_array((height, w)) if x is None else x for x, w in zip(blocks, widths, strict=True)]
-    return sparse.hstack(filled, format="csr")
+        Args:
+            problem: the problem.
+            units: of the program.
+            tolerance: relative, of the solver's residuals and duality gap.
 
+        Raises:
+            ModuleNotFoundError: Clarabel is not installed.
+        """
+        self._problem, self._units = problem, units
+        self._scale = np.repeat([units.length_m, units.speed_m_s], 3)
+        self._count = len(problem.F)
+        self._coned = np.flatnonzero(problem.error_weight * problem.cost.linear)
+        parts = [self._motion(), self._meeting(), self._box(), self._thrust_cones(), self._error_cones()]
+        A = sparse.vstack([matrix for matrix, _ in parts]).tocsc()
+        self._b = np.concatenate([b for _, b in parts])
+        zero, positive = len(parts[0][1]) + len(parts[1][1]), len(parts[2][1])
+        P, q = self._objective()
+        cones = Cones(zero, positive, self._count + len(self._coned), self._cone_size)
+        self._solver = ConeSolver(P, q, A, cones, tolerance=tolerance)
 
-def _motion(problem: Problem) -> _Rows:
-    """f(k+1) - Phi f(k) - Gamma u(k) = 0 from f(0) = 0."""
-    steps = len(problem.Phi)
-    Phi = problem.Phi * _UNITS / _UNITS[:, None]
-    Gamma = problem.Gamma * problem.limit[:, None, None] / _UNITS[:, None]
-    size, before = (6 * steps, 6 * steps), np.concatenate([[0], np.arange(steps)])
-    states = sparse.eye_array(6 * steps) - sparse.bsr_array((Phi[1:], np.arange(steps - 1), before), shape=size)
-    thrust = sparse.bsr_array((-Gamma, np.arange(steps), np.arange(steps + 1)), shape=(6 * steps, 3 * steps))
-    return _Rows(_beside(problem, states, thrust), np.zeros(6 * steps))
+    def solve(self, start: Array) -> Plan:
+        """The best plan from a start (6,), m and m/s.
 
+        Raises:
+            UnreachableError: no thrust within the limit meets the goals.
+        """
+        h, n, b = self._problem, self._count, self._b.copy()
+        b[:6] = (h.F[0] @ start + h.d[0]) / self._scale
+        solution = self._solver.solve(b)
+        x = solution.x
+        return Plan(
+            cost_m_s=solution.cost * self._cost_unit + self._constant(),
+            states=x[: 6 * n].reshape(n, 6) * self._scale,
+            controls=x[6 * n : 9 * n].reshape(n, 3) * h.limit_m_s2[:, None],
+            solved=solution.solved,
+            status=solution.status,
+            z=solution.z,
+        )
 
-def _pick(problem: Problem, instants: IntArray, block: Array) -> Any:
-    """Rows that take a block (rows, 6) of the state at each of some instants, the first of which is 1."""
-    chosen = sparse.eye_array(len(problem.Phi), format="csr")[instants - 1]
-    return sparse.kron(chosen, block)
+    def multipliers(self, plan: Plan) -> Array:
+        """Multipliers (N + 1, 6) of the errors, from the start on, see `certificate`, m/s per m and per m/s."""
+        h, result = self._problem, np.zeros((self._count + 1, 6))
+        off = plan.states[:, :3] - h.place_m
+        result[1:, :3] = 2 * (h.cost.quadratic * h.error_weight[:, None]) * off
+        cones = plan.z[len(plan.z) - self._cone_size * len(self._coned) :].reshape(-1, self._cone_size)
+        result[1 + self._coned, :3] = -cones[:, 1:4] / self._units.length_m * self._cost_unit
+        meeting = plan.z[6 * self._count : 6 * (self._count + len(h.met))].reshape(-1, 6)
+        result[[1 + block for block in h.met]] = meeting / self._scale * self._cost_unit
+        return result
 
+    @property
+    def _cost_unit(self) -> float:
+        """Unit of the cost, m/s."""
+        return self._units.accel_m_s2 * self._units.time_s
 
-def _meeting(problem: Problem) -> _Rows:
-    """f = goal - free path, at the instants to be met."""
-    met = np.array(problem.met, int)
-    return _Rows(_beside(problem, _pick(problem, met, np.eye(6))), -(problem.miss[met] / _UNITS).ravel())
+    @property
+    def _cone_size(self) -> int:
+        """Rows of each cone: a length, three axes, and the scatter."""
+        return 4 if self._problem.error_scatter_m is None else 5
 
+    def _width(self) -> int:
+        """Number of variables."""
+        return 10 * self._count + len(self._coned)
 
-def _box(problem: Problem) -> _Rows:
-    """-1 <= u <= 1, in units of the limit."""
-    axes = sparse.eye_array(3 * len(problem.Phi))
-    return _Rows(_beside(problem, thrust=sparse.vstack([axes, -axes])), np.ones(6 * len(problem.Phi)))
+    def _objective(self) -> tuple[Any, Array]:
+        """P and q of x'Px / 2 + q'x."""
+        h, n, length, unit = self._problem, self._count, self._units.length_m, self._cost_unit
+        # w c |x - r|^2 = w c |x|^2 - 2 w c r.x + a constant, with c the quadratic coefficient
+        squares, slopes = np.zeros((2, n, 6))
+        weight = 2 * (h.cost.quadratic * h.error_weight)[:, None] / unit
+        squares[:, :3], slopes[:, :3] = weight * length**2, -weight * length * h.place_m
+        thrust = h.duration_s / self._units.time_s * (h.limit_m_s2 / self._units.accel_m_s2)
+        errors = h.error_weight[self._coned] * length / unit
+        P = np.concatenate([squares.ravel(), np.zeros(4 * n + len(self._coned))])
+        return sparse.diags(P).tocsc(), np.concatenate([slopes.ravel(), np.zeros(3 * n), thrust, errors])
 
+    def _constant(self) -> float:
+        """The part of a quadratic cost that no plan changes, m/s."""
+        h = self._problem
+        squares = (h.place_m**2).sum(axis=1) + (0.0 if h.error_scatter_m is None else h.error_scatter_m**2)
+        return float(h.cost.quadratic * h.error_weight @ squares)
 
-def _thrusts(problem: Problem) -> _Rows:
-    """(length, u) in the cone, at each step."""
-    each = sparse.eye_array(len(problem.Phi))
-    return _Rows(
-        _beside(problem, thrust=sparse.kron(each, -_VECTOR), length=sparse.kron(each, -_LENGTH)),
-        np.zeros(4 * len(problem.Phi)),
-    )
+    def _motion(self) -> tuple[Any, Array]:
+        """x_(j+1) - F_j x_j - G_j u_j = d_j."""
+        h, n, scale = self._problem, self._count, self._scale
+        F, G = h.F * scale / scale[:, None], h.G * h.limit_m_s2[:, None, None] / scale[:, None]
+        along = np.arange(n)
+        # F of the first block acts on the start, which stands on the right-hand side
+        past = sparse.bsr_array((F[1:], along[: n - 1], np.concatenate([[0], along])), shape=(6 * n, 6 * n))
+        push = sparse.bsr_array((G, along, np.arange(n + 1)), shape=(6 * n, 3 * n))
+        rest = sparse.csc_array((6 * n, n + len(self._coned)))
+        return sparse.hstack([sparse.eye_array(6 * n) - past, -push, rest]), (h.d / scale).ravel()
 
+    def _meeting(self) -> tuple[Any, Array]:
+        """x = goal at the ends of the blocks met."""
+        met = np.array(self._problem.met, int)
+        columns = (6 * met[:, None] + np.arange(6)).ravel()
+        goal = np.zeros(0) if self._problem.goal is None else (self._problem.goal / self._scale).ravel()
+        return self._picked(np.arange(6 * len(met)), columns, 6 * len(met), 1.0), goal
 
-def _errors(problem: Problem) -> _Rows:
-    """(length, f + miss) in the cone, positions only, at each instant with a linear price."""
-    judged = _coned(problem)
-    states = _pick(problem, judged, -_VECTOR @ np.eye(3, 6))
-    lengths = sparse.kron(sparse.eye_array(len(judged)), -_LENGTH)
-    return _Rows(
-        _beside(problem, states=states, error=lengths), (problem.miss[judged, :3] / LENGTH_M @ _VECTOR.T).ravel()
-    )
+    def _box(self) -> tuple[Any, Array]:
+        """-1 <= u <= 1 along each axis, in units of the limit."""
+        n = self._count
+        both = sparse.vstack([sparse.eye_array(3 * n), -sparse.eye_array(3 * n)])
+        rest = sparse.csc_array((6 * n, n + len(self._coned)))
+        return sparse.hstack([sparse.csc_array((6 * n, 6 * n)), both, rest]), np.ones(6 * n)
 
+    def _thrust_cones(self) -> tuple[Any, Array]:
+        """(t_j, u_j, sigma_j) in the cone."""
+        h, n = self._problem, self._count
+        b = np.zeros((n, self._cone_size))
+        if h.thrust_scatter_m_s2 is not None:
+            b[:, 4] = h.thrust_scatter_m_s2 / h.limit_m_s2
+        return self._cones(9 * n + np.arange(n), 6 * n + 3 * np.arange(n)), b.ravel()
 
-def _objective(problem: Problem) -> tuple[Any, Array]:
-    """P and q of x'Px / 2 + q'x, m/s."""
-    judged = _coned(problem)
-    lengths, errors = problem.dt_s * problem.limit, problem.price[judged] * LENGTH_M
-    steps, price = len(problem.Phi), problem.quadratic * problem.price[1:]
-    # c |f + miss|^2 = c |f|^2 + 2 c miss.f + a constant
-    squares, slopes = np.zeros((2, steps, 6))
-    squares[:, :3] = 2 * price[:, None] * LENGTH_M**2
-    slopes[:, :3] = 2 * price[:, None] * LENGTH_M * problem.miss[1:, :3]
-    rest = np.zeros(4 * steps + len(judged))
-    P = sparse.csc_array(sparse.diags_array(np.concatenate([squares.ravel(), rest])))
-    return P, np.concatenate([slopes.ravel(), np.zeros(3 * steps), lengths, errors])
+    def _error_cones(self) -> tuple[Any, Array]:
+        """(s_j, x_j - r_j, rho_j) in the cone, at the blocks' ends with a linear cost."""
+        h, coned, length = self._problem, self._coned, self._units.length_m
+        b = np.zeros((len(coned), self._cone_size))
+        b[:, 1:4] = -h.place_m[coned] / length
+        if h.error_scatter_m is not None:
+            b[:, 4] = h.error_scatter_m[coned] / length
+        return self._cones(10 * self._count + np.arange(len(coned)), 6 * coned), b.ravel()
 
+    def _cones(self, lengths: NDArray[np.intp], vectors: NDArray[np.intp]) -> Any:
+        """Rows of cones, given the columns of their lengths and of the first of three components."""
+        first = self._cone_size * np.arange(len(lengths))
+        rows = np.concatenate([first, (first[:, None] + [1, 2, 3]).ravel()])
+        columns = np.concatenate([lengths, (vectors[:, None] + [0, 1, 2]).ravel()])
+        return self._picked(rows, columns, self._cone_size * len(lengths), -1.0)
 
-def _read(problem: Problem, x: Array, z: Array) -> Solution:
-    """The plan and the multipliers of the errors, in SI units."""
-    steps, judged, met = len(problem.Phi), _coned(problem), list(problem.met)
-    forced, thrust = x[: 6 * steps].reshape(-1, 6) * _UNITS, x[6 * steps : 9 * steps].reshape(-1, 3)
-    multipliers = np.zeros((steps + 1, 6))
-    multipliers[1:, :3] = 2 * (problem.quadratic * problem.price[1:, None]) * (forced + problem.miss[1:])[:, :3]
-    multipliers[judged, :3] = -z[len(z) - 4 * len(judged) :].reshape(-1, 4)[:, 1:] / LENGTH_M
-    multipliers[met] = z[6 * steps : 6 * (steps + len(met))].reshape(-1, 6) / _UNITS
-    return Solution(problem.limit[:, None] * np.clip(thrust, -1, 1), multipliers)
+    def _picked(self, rows: NDArray[np.intp], columns: NDArray[np.intp], height: int, value: float) -> Any:
+        """Rows (height, variables) with one value at some places."""
+        return sparse.csc_array((np.full(len(rows), value), (rows, columns)), shape=(height, self._width()))

@@ -1,4 +1,4 @@
-"""What a policy costs over what is possible at all."""
+"""Ratio of a policy's cost to the perfect-information lower bound."""
 
 from dataclasses import dataclass
 

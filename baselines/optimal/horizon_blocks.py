@@ -1,4 +1,4 @@
-"""How a plan's time is cut into blocks: short ones now, longer ones later, none across an arrival or a phase's end."""
+"""Blocks of a receding horizon: short ones first, longer ones later, none across an arrival or a phase's end."""
 
 from collections.abc import Sequence
 
@@ -22,7 +22,7 @@ def horizon_end(plan: Sequence[Leg], instant: int, hold_steps: int) -> int:
 
 
 def block_ends(
-    plan: Sequence[Leg], instant: int, last: int, finest: int, coarsest: int, growth: float
+    plan: Sequence[Leg], instant: int, last: int, *, finest: int, coarsest: int, growth: float
 ) -> NDArray[np.intp]:
     """Instants (N + 1,) from now to the last, between which the thrust is constant.
 
@@ -38,25 +38,24 @@ def block_ends(
     nodes = [instant]
     for stop in stops:
         while nodes[-1] < stop:
-            wanted = int(growth * (nodes[-1] - instant))
-            nodes.append(min(nodes[-1] + min(max(wanted, finest), coarsest), stop))
+            grown = int(growth * (nodes[-1] - instant))
+            nodes.append(min(nodes[-1] + min(max(grown, finest), coarsest), stop))
     return np.array(nodes)
 
 
-def shared_prices(price: Array, judge: NDArray[np.intp], nodes: NDArray[np.intp]) -> Array:
-    """Prices (N,) of the errors at the blocks' ends, so that errors in between count as if on a straight line.
+def shared_error_weights(error_weight: Array, leg: NDArray[np.intp], nodes: NDArray[np.intp]) -> Array:
+    """Weights (N,) of the errors at the blocks' ends, so that errors in between count as if on a straight line.
 
-    What is before the first end, or judged by another phase than the block's beginning, counts at the block's end.
+    An error before the first block's end, or scored by another phase than the block's start, counts at the block's end.
 
     Args:
-        price: of the error at each instant of the episode (instants,).
-        judge: phase that judges each instant (instants,).
+        error_weight: of the error at each instant of the episode (instants,).
+        leg: phase that scores each instant (instants,), see `task.reward.Scoring`.
         nodes: the blocks' ends (N + 1,), in steps.
     """
     steps = np.arange(nodes[0] + 1, nodes[-1] + 1)
     block = np.searchsorted(nodes, steps) - 1
     start, end = nodes[block], nodes[block + 1]
-    early = np.where((block > 0) & (judge[start] == judge[steps]), (end - steps) / (end - start), 0.0)
-    shares = np.bincount(block + 1, (1 - early) * price[steps], len(nodes))
-    shares += np.bincount(block, early * price[steps], len(nodes))
-    return shares[1:]
+    early = np.where((block > 0) & (leg[start] == leg[steps]), (end - steps) / (end - start), 0.0)
+    late_shares = np.bincount(block + 1, (1 - early) * error_weight[steps], len(nodes))
+    return np.asarray((late_shares + np.bincount(block, early * error_weight[steps], len(nodes)))[1:], float)

@@ -1,4 +1,4 @@
-"""The least delta-v of a transfer on any time grid: without a thrust limit, burns shrink to impulses.
+"""Least delta-v of a transfer on any time grid: without a thrust limit, burns shrink to impulses.
 
 The dual problem has six unknowns: lambda, the adjoint state at the arrival, with lambda.d greatest as long as the
 primer vector's length is nowhere above 1 (Lawden 1963; Neustadt 1964, "Optimization, a moment problem, and nonlinear
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from baselines.optimal.cone_solver import solve_cones
+from baselines.optimal.cone_solver import Cones, ConeSolver
 from baselines.optimal.problem import start_of
 from formation_env.dynamics import DiscreteModel, get_dynamics
 from formation_env.numerics.arrays import Array
@@ -25,9 +25,9 @@ from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import Leg, leg_reference, legs
 
 _FINER: Final = 8
-"""How much finer the primer vector is looked at than impulses are allowed."""
+"""Instants at which the primer vector is evaluated, per instant at which an impulse is allowed."""
 _UNITS: Final = np.repeat([1000.0, 1.0], 3)
-"""Of miss distances and velocities in the program, m and m/s."""
+"""Units of miss distances and velocities in the program, m and m/s."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def impulsive_transfer(
 ) -> ImpulsivePlan:
     """The least delta-v of a phase's transfer with no thrust limit and a time grid that does not matter.
 
-    What `fuel_optimal` with `exact_arrival` needs above it is the price of the time step and of the thrust limit.
+    `fuel_optimal` with `exact_arrival` needs more by what the time step and the thrust limit cost.
 
     Args:
         scenario: a registered id, a scenario's name or path, or a Scenario, with a linear truth.
@@ -62,6 +62,7 @@ def impulsive_transfer(
 
     Raises:
         ValueError: a nonlinear truth, a phase without transfer, a state of wrong shape, or fewer than 2 instants.
+        SolverError: the solver failed, or no impulses at these instants reach the goal.
         ModuleNotFoundError: Clarabel is not installed; it comes with the extra `optimal`.
     """
     scenario = load_scenario(scenario)
@@ -107,5 +108,6 @@ def _solve(effects: Array, miss: Array) -> tuple[Array, Array]:
     primer = np.zeros((count, 4, 6))
     primer[:, 1:] = -(effects / _UNITS[:, None]).transpose(0, 2, 1)
     A, b = sparse.csc_array(primer.reshape(-1, 6)), np.tile(np.eye(4)[0], count)
-    adjoint, multipliers = solve_cones(sparse.csc_array((6, 6)), -miss / _UNITS, A, b, 0, 0, count)
-    return adjoint / _UNITS, -multipliers.reshape(count, 4)[:, 1:]
+    solver = ConeSolver(sparse.csc_array((6, 6)), -miss / _UNITS, A, Cones(zero=0, positive=0, vectors=count))
+    solution = solver.solve(b).checked("impulsive_transfer")
+    return solution.x / _UNITS, -solution.z.reshape(count, 4)[:, 1:]

@@ -1,4 +1,4 @@
-"""What an episode asks for, with nothing left to chance: the data of the fuel optimum.
+"""Data of the perfect-information optimum: an episode whose start and disturbances are all known.
 
 Legend: Phi, Gamma as in `DiscreteModel`, of each step.
 """
@@ -14,6 +14,7 @@ from formation_env.dynamics import NONLINEAR
 from formation_env.envs import FormationEnv
 from formation_env.envs.interface import INFO_THRUST
 from formation_env.numerics.arrays import Array
+from formation_env.task.reward import ErrorCost
 from formation_env.task.scenario import Limits, Scenario
 from formation_env.task.schedule import Leg, build_schedule, column, columns, leg_reference, legs
 
@@ -23,7 +24,7 @@ _FAR_M: Final = 1e9
 
 @dataclass(frozen=True)
 class Problem:
-    """Least sum over steps of |u| dt + price (linear |e| + quadratic |e|^2), with e the position error at a step's end.
+    """Minimise the sum over steps of |u| dt + w (linear |e| + quadratic |e|^2), e being the error at a step's end.
 
     The thrust u of step k is within +-limit[k] on each axis; the state is free_path plus what the thrust does.
 
@@ -33,9 +34,8 @@ class Problem:
         Gamma: input matrices (steps, 6, 3).
         free_path: states without thrust (steps + 1, 6), m and m/s; the process noise is in them.
         goal: states (steps + 1, 6) that errors are counted from; the velocity matters at the instants to be met only.
-        price: of an error at each instant (steps + 1,), (m/s) per unit of the reward's shape.
-        linear: cost per m.
-        quadratic: cost per m^2.
+        error_weight: weight w of the error at each instant (steps + 1,), (m/s) per m; 0 at the start.
+        cost: cost of an error per unit of its weight.
         limit: greatest thrust acceleration along each axis (steps,), m/s^2.
         met: instants at which the state must be the goal.
     """
@@ -45,9 +45,8 @@ class Problem:
     Gamma: Array
     free_path: Array
     goal: Array
-    price: Array
-    linear: float
-    quadratic: float
+    error_weight: Array
+    cost: ErrorCost
     limit: Array
     met: tuple[int, ...]
 
@@ -66,7 +65,7 @@ def episode_problem(
         scenario: what is flown; its truth must be linear.
         seed: of the episode; its start and all its noises are known then.
         initial_state: LVLH state (6,) to start at without any noise, m and m/s; the nominal start if neither is given.
-        exact_arrival: drop the price of errors; be at the reference at each transfer's two ends instead.
+        exact_arrival: drop the weight of errors; be at the reference at each transfer's two ends instead.
 
     Raises:
         ValueError: a nonlinear truth, both a seed and a state, a state of wrong shape, or no transfer to arrive from.
@@ -75,12 +74,12 @@ def episode_problem(
     start = start_of(scenario, legs(scenario)[0], initial_state)
     if seed is not None and initial_state is not None:
         raise ValueError(f"initial_state: give it or a seed, not both; got seed = {seed}")
-    model, shape = scenario.true_dynamics().steps(0, scenario.num_steps), scenario.reward.error_cost
+    model = scenario.true_dynamics().steps(0, scenario.num_steps)
     if seed is None:
-        free_path, gains = _coast(scenario, start), np.ones(scenario.num_steps)
+        free_path, thrust_gain = _coast(scenario, start), np.ones(scenario.num_steps)
     else:
-        free_path, gains = _episode(scenario, seed)
-    goal, price = _scores(scenario)
+        free_path, thrust_gain = _episode(scenario, seed)
+    goal, weight = _scores(scenario)
     met = _meet(scenario, goal) if exact_arrival else ()
     return Problem(
         dt_s=scenario.dt_s,
@@ -88,10 +87,9 @@ def episode_problem(
         Gamma=model.Gamma,
         free_path=free_path,
         goal=goal,
-        price=0 * price if exact_arrival else price,
-        linear=float(shape == "linear"),
-        quadratic=float(shape == "quadratic") / scenario.reward.quadratic_scale_m,
-        limit=scenario.spacecraft.max_accel_m_s2 * np.abs(gains),
+        error_weight=0 * weight if exact_arrival else weight,
+        cost=scenario.reward.cost(),
+        limit=scenario.spacecraft.max_accel_m_s2 * np.abs(thrust_gain),
         met=met,
     )
 
@@ -102,7 +100,7 @@ def flown_scenario(scenario: Scenario, seed: int) -> Scenario:
         return scenario
     env = FormationEnv(scenario)
     env.reset(seed=seed)
-    return env.simulation.flown
+    return env.simulation.first_row_scenario
 
 
 def start_of(scenario: Scenario, leg: Leg, initial_state: ArrayLike | None) -> Array:
@@ -145,7 +143,7 @@ def _fly(env: FormationEnv, seed: int, action: float) -> tuple[Array, Array]:
 
 
 def _scores(scenario: Scenario) -> tuple[Array, Array]:
-    """What each instant is judged by: a state (steps + 1, 6), of which only the position counts, and the price."""
+    """Scored state (steps + 1, 6), of which only the position counts, and error weight (steps + 1,) of each instant."""
     table = build_schedule(scenario)
     goal = np.zeros((len(table), 6))
     goal[:, :3] = columns(table, "scored_position")

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from baselines.experiments.statistics import Results
-from baselines.report.metric_columns import METRIC_COLUMNS
 from baselines.report.text import Cells, column, microseconds, number
+from formation_env.kernel.metrics import METRICS
 
 MAIN = ("delta_v_m_s", "position_error_mean_m", "in_tolerance")
 """Metrics that stand beside the cost; the others have a table of their own, so that the first fits the page."""
@@ -27,7 +27,7 @@ def main_table(results: Results) -> dict[str, Any]:
 
 def metrics_table(results: Results) -> dict[str, Any]:
     """All other metrics of each policy."""
-    return _table(results, [_metric(results, name) for name in METRIC_COLUMNS if name not in ("return", *MAIN)])
+    return _table(results, [_metric(results, name) for name in METRICS if name not in ("return", "steps", *MAIN)])
 
 
 def seeds_flown_table(results: Results) -> list[dict[str, Any]]:
@@ -69,8 +69,8 @@ def _column(heading: str, unit: str, cells: Sequence[Cells | None], best: Sequen
 
 
 def _metric(results: Results, metric: str) -> Column:
-    shown = METRIC_COLUMNS[metric]
-    best = results.best_of(metric) if shown.better else []
+    shown = METRICS[metric]
+    best = results.best_of(metric)
     cells = column([results.interval(name, metric) for name in results.ranking], shown.factor)
     return _column(shown.heading, shown.unit, cells, [name in best for name in results.ranking])
 

@@ -14,7 +14,7 @@ from baselines.report import style
 from baselines.report.scales import Scale, round_values, view_buttons, without_zeros
 from baselines.report.style import Look
 from baselines.report.text import number
-from formation_env.task.scenario import Reward
+from formation_env.task.reward import Reward
 
 Looks = dict[str, Look]
 _HEIGHT = 400
@@ -132,8 +132,8 @@ def _add_views(figure: go.Figure, results: Results, x: dict[str, np.ndarray], y:
 
 def equal_cost_lines(reward: Reward, x: Scale, y: Scale) -> Iterable[go.Scatter]:
     """Lines of delta-v + weight * mean error = cost; none where the reward is of another form."""
-    weight = reward.error_weight
-    if reward.error_cost != "linear" or reward.transfer_error_weight > 0 or weight <= 0:
+    weight = reward.mean_error_weight()
+    if not weight:
         return
     for cost in round_values(max(x.low, 0) + weight * max(y.low, 0), x.high + weight * y.high):
         thrust = x.grid(cost)

@@ -6,6 +6,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from baselines.controllers.registry import POLICIES
+
 NEUTRAL: Final = "#868b94"
 """Grey that reads on light and on dark."""
 GRID: Final = "rgba(128, 134, 144, 0.25)"
@@ -30,30 +32,29 @@ class Look:
     dash: str
 
 
-# Based on Okabe and Ito's colours, which colour-blind readers can tell apart; all have a contrast of 3 or more on the
-# light and on the dark page. They are too few, so symbols differ everywhere, and dashes where two colours are close.
-_FIXED: Final = {
-    "lqr": Look("#0072B2", "circle", "solid"),
-    "lqr_nominal": Look("#6C5CE7", "hexagram", "dashdot"),
-    "mpc": Look("#C2408A", "star", "solid"),
-    "lqr_finite": Look("#8E7CC3", "diamond", "dot"),
-    "lqr_quasi_static": Look("#3D9BD1", "square", "dash"),
-    "smc": Look("#D55E00", "triangle-up", "solid"),
-    "two_impulse": Look("#CC79A7", "triangle-down", "solid"),
-    "deadband": Look("#9A7B2C", "pentagon", "dash"),
-    "zero": Look(NEUTRAL, "x", "dot"),
-    "random": Look(NEUTRAL, "cross", "dashdot"),
-}
+# The policies' classes state their looks in colours based on Okabe and Ito's, which colour-blind readers can tell apart.
+# All have a contrast of 3 or more on the light and on the dark page. They are too few, so symbols differ everywhere, and
+# dashes where two colours are close.
 _FREE_COLORS: Final = ("#009E73", "#C98500")
 _FREE_SYMBOLS: Final = ("hexagon", "hourglass", "bowtie", "diamond-tall")
 _FREE_DASHES: Final = ("solid", "dash", "dot", "dashdot")
 
 
 def looks(policies: Iterable[str]) -> dict[str, Look]:
-    """The look of each policy: classical policies have fixed looks, others get free ones in order."""
+    """The look of each policy: that of its class, else the next free one, in order."""
     names = list(dict.fromkeys(policies))
-    places = {name: place for place, name in enumerate(name for name in names if name not in _FIXED)}
-    return {name: _FIXED[name] if name in _FIXED else _free(places[name]) for name in names}
+    stated = {name: look for name in names if (look := _stated(name)) is not None}
+    places = {name: place for place, name in enumerate(name for name in names if name not in stated)}
+    return {name: stated[name] if name in stated else _free(places[name]) for name in names}
+
+
+def _stated(name: str) -> Look | None:
+    """The look that a policy's class states; None if it states none, or the policy is a learned one."""
+    policy = POLICIES.get(name)
+    if policy is None:
+        return None
+    color = policy.color or (NEUTRAL if policy.is_reference else None)
+    return None if color is None else Look(color, policy.symbol, policy.dash)
 
 
 def _free(place: int) -> Look:

@@ -7,12 +7,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Final
 
-from baselines.controllers.registry import SOLVER
 from baselines.experiments import parallel
 from baselines.experiments.cached_jobs import FOLDER, cached
 from baselines.experiments.comparison import Environment, name_environments
 from baselines.experiments.policy_factories import PolicyFactory
 from baselines.experiments.sweep import Sweep, points
+from baselines.optimal.cone_solver import SOLVER
 from baselines.report.csv_text import csv_text
 from baselines.report.json_document import to_json, versions
 from baselines.report.sweep_page import render

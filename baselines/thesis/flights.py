@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.design.guidance import Guide, desired_states
+from baselines.design.guidance import GuidanceName, desired_states
 from baselines.experiments.policy_batch import SideBySide
 from formation_env.envs import interface
 from formation_env.envs.vector import FormationVectorEnv
@@ -121,7 +121,7 @@ def fly(
     policies: Sequence[Policy],
     scenario: Scenario,
     seeds: Sequence[int],
-    guide: Guide = "automatic",
+    guide: GuidanceName = "automatic",
     every: int = 1,
     few: int = FEW,
     measured: bool = False,
@@ -175,7 +175,7 @@ def whole_periods(scenario: Scenario) -> list[int]:
     return [time for time in range(1, longest + 1) if scenario.steps(time) <= scenario.num_steps]
 
 
-def desired_path(scenario: Scenario, guide: Guide) -> Array:
+def desired_path(scenario: Scenario, guide: GuidanceName) -> Array:
     """The desired path (num_steps + 1, 6): each leg's from its beginning, the end of a leg being its own."""
     states = np.empty((scenario.num_steps + 1, 6))
     for leg in legs(scenario):
@@ -226,7 +226,7 @@ class _Log:
     """Adds up infos step by step, and keeps what `Flights` has."""
 
     def __init__(
-        self, scenario: Scenario, shape: tuple[int, int], steps: NDArray[np.intp], few: int, guide: Guide
+        self, scenario: Scenario, shape: tuple[int, int], steps: NDArray[np.intp], few: int, guide: GuidanceName
     ) -> None:
         count = len(steps)
         longest = int(np.diff(steps, prepend=-1).max())

@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from baselines.controllers.policy import AccelerationPolicy
-from baselines.design.guidance import Guide
+from baselines.design.guidance import GuidanceName
 from baselines.thesis import scenarios
 from baselines.thesis.flights import FEW, Flights, fly
 from formation_env.task.scenario import Scenario
@@ -53,7 +53,7 @@ class Job:
     scenario: Scenario
     laws: tuple[Law, ...]
     seeds: tuple[int, ...]
-    guide: Guide = "automatic"
+    guide: GuidanceName = "automatic"
     every: int = 1
     few: int = FEW
     measured: bool = False

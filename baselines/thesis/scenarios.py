@@ -11,9 +11,9 @@ from typing import Any, Final
 import numpy as np
 
 from baselines.controllers.lqr import LQRSettings
-from baselines.controllers.lqr_quasi_static import LQRTrackingSettings
+from baselines.controllers.lqr_quasi_static import LQRQuasiStaticSettings
 from baselines.controllers.policy import AccelerationPolicy
-from baselines.controllers.registry import make_policy, read_gains
+from baselines.controllers.registry import make_policy, read_settings
 from baselines.controllers.weights import Weights
 from formation_env.dropout import NoDropout
 from formation_env.dropout.windows import Window, Windows
@@ -125,18 +125,18 @@ def law(name: str, scenario: Scenario, shipped: str, control_s2: float | None = 
         shipped: whose gains: a file in configs/baselines, such as `thesis_keeping`.
         control_s2: factor a of the control weight R = a I / n^2 in place of the printed one, s^2.
     """
-    gains = read_gains(name, config_folder("baselines") / f"{shipped}.yaml")
+    gains = read_settings(name, config_folder("baselines") / f"{shipped}.yaml")
     return make_policy(name, scenario, gains if control_s2 is None else reweighted(gains, control_s2))
 
 
-def reweighted(gains: Any, control_s2: float) -> LQRSettings | LQRTrackingSettings:
+def reweighted(gains: Any, control_s2: float) -> LQRSettings | LQRQuasiStaticSettings:
     """Gains of a regulator with the control weight R = a I / n^2, a in s^2.
 
     Raises:
         ValueError: gains of something else.
     """
     R = Weights(control_s2=(control_s2, control_s2, control_s2)).control_s2
-    if isinstance(gains, LQRTrackingSettings):
+    if isinstance(gains, LQRQuasiStaticSettings):
         return replace(gains, hold=replace(gains.hold, control_s2=R), transfer=replace(gains.transfer, control_s2=R))
     if isinstance(gains, LQRSettings):
         weights = replace(gains.transfer.weights, control_s2=R)

@@ -1,86 +1,24 @@
-"""What is searched: gains and limits. To make a policy tunable: a line in `KNOBS`, and its gains in default.yaml."""
+"""Search spaces applied to settings; each policy class states its own, see `baselines.controllers.search_space`."""
 
 import copy
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from baselines.controllers.registry import read_gains
+from baselines.controllers.registry import POLICIES, read_settings
+from baselines.controllers.search_space import Parameter
 from formation_env.settings import load_yaml
 from formation_env.task.loading import config_folder
 from formation_env.task.scenario import Scenario
 
-
-@dataclass(frozen=True)
-class Knob:
-    """Gains that are turned together.
-
-    Attributes:
-        keys: dotted paths of the gains; a number is an axis. The first one is the knob's name.
-        low: least value, in the gain's unit.
-        high: greatest value.
-        log: whether its decades are searched evenly, else its values.
-        transfer: whether it matters to transfers only.
-    """
-
-    keys: tuple[str, ...]
-    low: float
-    high: float
-    log: bool = True
-    transfer: bool = False
-
-    @property
-    def name(self) -> str:
-        """What a study calls it."""
-        return self.keys[0]
-
-
-def _regulator(section: str, transfer: bool) -> tuple[Knob, ...]:
-    """Weights of a regulator: along-track and cross-track position weights stay 1, since only ratios matter."""
-    return (
-        Knob((f"{section}.position.0",), 1e-2, 1e2, transfer=transfer),
-        Knob((f"{section}.velocity_s2.0", f"{section}.velocity_s2.1"), 1e2, 1e8, transfer=transfer),
-        Knob((f"{section}.velocity_s2.2",), 1e2, 1e8, transfer=transfer),
-        Knob((f"{section}.control_s2.0", f"{section}.control_s2.1"), 1, 1e8, transfer=transfer),
-        Knob((f"{section}.control_s2.2",), 1, 1e8, transfer=transfer),
-    )
-
-
-_CORRECTION: Final = (
-    Knob(("correction.miss_m",), 0.3, 300, transfer=True),
-    Knob(("correction.miss_sigmas",), 0.2, 10, transfer=True),
-)
-_KEEPING: Final = (
-    Knob(("keeping.band_m",), 0.5, 200),
-    Knob(("keeping.look_ahead_orbits",), 0.05, 2),
-    Knob(("keeping.least_reduction",), 0, 0.95, log=False),
-)
+Knob = Parameter
 
 KNOBS: Final[dict[str, tuple[Knob, ...]]] = {
-    "lqr": (
-        Knob(("reweighted_lqg.floor",), 1e-5, 1e-2),
-        Knob(("reweighted_lqg.error_weight_scale",), 0.3, 3),
-        Knob(("deadband",), 0, 1, log=False),
-    ),
-    "lqr_nominal": (Knob(("reweighted_lqg.floor",), 1e-5, 1e-2), Knob(("reweighted_lqg.error_weight_scale",), 0.3, 3)),
-    "lqr_finite": (*_regulator("transfer", transfer=True), *_regulator("hold", transfer=False)),
-    "lqr_quasi_static": (*_regulator("transfer", transfer=True), *_regulator("hold", transfer=False)),
-    "smc": (
-        *(Knob((f"surface.decay_per_s.{axis}",), 3e-5, 3e-2) for axis in range(3)),
-        Knob(("reaching.eps_m_s",), 1e-4, 1),
-        Knob(("reaching.q_per_s",), 3e-5, 3e-2),
-        Knob(("boundary_m",), 0.1, 1e4),
-    ),
-    "two_impulse": (*_CORRECTION, Knob(("braking",), 0, 1.5, log=False, transfer=True), *_KEEPING),
-    "deadband": (Knob(("least_thrust",), 1e-3, 0.5, transfer=True), *_CORRECTION, *_KEEPING),
-    "mpc": (
-        Knob(("error_weight_scale",), 0.3, 3),
-        Knob(("error_scatter",), 0, 3, log=False),
-        Knob(("thrust_scatter",), 0, 2, log=False),
-    ),
+    name: policy.search_space
+    for name, policy in sorted(POLICIES.items(), key=lambda each: each[1].slow)
+    if policy.search_space
 }
-"""Policy -> its knobs; the slowest comes last."""
+"""Policy -> its search space; slow ones come last."""
 
 
 def knobs_for(policy: str, scenario: Scenario) -> tuple[Knob, ...]:
@@ -92,7 +30,7 @@ def knobs_for(policy: str, scenario: Scenario) -> tuple[Knob, ...]:
 def first_gains(policy: str) -> dict[str, Any]:
     """What a search begins with: the policy's section of default.yaml, which has every knob."""
     path = config_folder("baselines") / "default.yaml"
-    read_gains(policy, path)  # refuses what is wrong in it
+    read_settings(policy, path)  # refuses what is wrong in it
     section: dict[str, Any] = load_yaml(path)[policy]
     return section
 
@@ -105,7 +43,7 @@ def present_gains(policy: str, path: Path, knobs: Sequence[Knob]) -> dict[str, f
     """
     if not path.is_file():
         return None
-    read_gains(policy, path)
+    read_settings(policy, path)
     try:
         values = read(load_yaml(path).get(policy, {}), knobs)
     except (KeyError, IndexError, TypeError):

@@ -1,4 +1,4 @@
-"""The environments: two faces of one simulation, and their registration."""
+"""The single and the batched environment, both faces of one simulation, and their registration."""
 
 import gymnasium
 
@@ -8,7 +8,11 @@ from formation_env.task.loading import ENV_IDS
 
 
 def register_all() -> None:
-    """Register the environments with Gymnasium, once."""
+    """Register the environments with Gymnasium, once.
+
+    The specs state no `max_episode_steps`, or Gymnasium would cut `make(id, scenario=...)` at the length of the id's
+    own scenario; `env.spec.max_episode_steps` of an environment made is the length of its plan.
+    """
     for env_id, scenario in ENV_IDS.items():
         if env_id not in gymnasium.registry:
             gymnasium.register(

@@ -1,35 +1,55 @@
-"""What the single and the batched environment have in common: spaces, info, checks."""
+"""Spaces, infos and checks of inputs that the single and the batched environment share."""
 
+import copy
+import functools
+import inspect
+import operator
 import reprlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
-from typing import Any, Final, cast
+from typing import Any, Final, NamedTuple, ParamSpec, cast
 
 import numpy as np
 from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
-from formation_env.kernel import tile as field
-from formation_env.kernel.simulation import Simulation
+from formation_env.kernel.simulation import ALL_ROWS, Rows, Simulation
 from formation_env.numerics.arrays import Array
 from formation_env.task import observation
 from formation_env.task.scenario import Scenario
 
-INFO_STATES: Final = {"true_state": (field.TRUTH, 6), "estimate": (field.ESTIMATE, 6)}
-"""Info key: first state field, size."""
+P = ParamSpec("P")
+
+INFO_STATES: Final = ("true_state", "estimate")
+"""Info keys that are parts of the simulation's state by the same name."""
 INFO_THRUST: Final = "accel_m_s2"
-INFO_SCALARS: Final[dict[str, tuple[int, type]]] = {
-    "position_error_m": (field.POSITION_ERROR, float),
-    "delta_v_m_s": (field.DELTA_V, float),
-    "error_cost_m_s": (field.ERROR_COST, float),
-    "exit_cost_m_s": (field.EXIT_COST, float),
-    "nis": (field.NIS, float),
-    "measured": (field.MEASURED, bool),
-    "phase": (field.PHASE, int),
+
+
+class Scalar(NamedTuple):
+    """An info of one number.
+
+    Attributes:
+        result: name of the simulation's result.
+        kind: its type.
+    """
+
+    result: str
+    kind: type
+
+
+INFO_SCALARS: Final[dict[str, Scalar]] = {
+    "position_error_m": Scalar("position_error", float),
+    "delta_v_m_s": Scalar("delta_v", float),
+    "error_cost_m_s": Scalar("error_cost", float),
+    "exit_cost_m_s": Scalar("exit_cost", float),
+    "nis": Scalar("nis", float),
+    "measured": Scalar("measured", bool),
+    "phase": Scalar("phase", int),
 }
-"""Info key: result field, type."""
-INFO_VARIANT: Final = {"variant": (field.VARIANT, int)}
-"""The same, of scenarios with domain randomization."""
+"""Info keys of one number each."""
+INFO_VARIANT: Final = {"variant": Scalar("variant", int)}
+"""Info key of scenarios with domain randomization."""
 _Float32Space = spaces.Space[NDArray[np.float32]]
 TOTALS: Final = "episode_totals"
 START_OPTION: Final = "initial_state"
@@ -45,16 +65,87 @@ def observation_space() -> spaces.Space[NDArray[np.float32]]:
     return cast(_Float32Space, spaces.Box(-observation.BOUND, observation.BOUND, (observation.SIZE,), np.float32))
 
 
-def info_scalars(scenario: Scenario) -> dict[str, tuple[int, type]]:
-    """The infos of one number that a scenario's environments give: key, result field, type."""
+def info_scalars(scenario: Scenario) -> dict[str, Scalar]:
+    """Info keys of one number each that a scenario's environments give."""
     return INFO_SCALARS if scenario.domain_randomization is None else INFO_SCALARS | INFO_VARIANT
+
+
+def analysis_infos(simulation: Simulation, rows: Rows = ALL_ROWS) -> dict[str, Array]:
+    """Infos of an environment made with `analysis=True`, each (rows, ...): see `StepNoises`."""
+    return simulation.step_noises(rows)._asdict()
+
+
+def with_length(spec: EnvSpec | None, max_episode_steps: int) -> EnvSpec | None:
+    """A copy of a spec that states the episode's length, unless it states one already.
+
+    The registered specs state none: Gymnasium would cut an environment made with `scenario=` at the length of the
+    registered scenario.
+    """
+    if spec is None or spec.max_episode_steps is not None:
+        return spec
+    stated = copy.copy(spec)
+    stated.max_episode_steps = max_episode_steps
+    return stated
+
+
+def known_arguments(init: Callable[P, None]) -> Callable[P, None]:
+    """Make a constructor name the arguments that it does not have, and the place of a scenario's settings."""
+    known = inspect.signature(init).parameters
+
+    @functools.wraps(init)
+    def checked(*args: P.args, **kwargs: P.kwargs) -> None:
+        unknown = [name for name in kwargs if name not in known]
+        if unknown:
+            name = type(args[0]).__name__
+            raise TypeError(
+                f"{name}: unknown argument {unknown[0]!r}; settings of the task belong to the scenario: "
+                f"scenario=dataclasses.replace(load_scenario('keeping'), {unknown[0]}=...), or the path of a YAML file"
+            )
+        init(*args, **kwargs)
+
+    return checked
+
+
+def check_seed(seed: Any) -> int | None:
+    """A seed as a Python number, or None.
+
+    Raises:
+        ValueError: no integer, or negative.
+    """
+    if seed is None:
+        return None
+    try:
+        number = operator.index(seed)
+    except TypeError:
+        number = -1
+    if number < 0 or isinstance(seed, bool):
+        raise ValueError(f"seed: must be an integer >= 0 or None, got {reprlib.repr(seed)}")
+    return number
+
+
+def check_seeds(seed: Any, num_rows: int) -> Sequence[int | None]:
+    """The seed of each row: seed + i of a number, the i-th of a list or an array, or None.
+
+    Raises:
+        ValueError: no integers, negative ones, or another number of them.
+    """
+    if seed is None:
+        return [None] * num_rows
+    if not isinstance(seed, (Sequence, np.ndarray)) or isinstance(seed, (str, bytes)) or np.ndim(seed) == 0:
+        first = check_seed(seed)
+        assert first is not None
+        return range(first, first + num_rows)
+    if len(seed) != num_rows:
+        raise ValueError(f"seed: a list must have {num_rows} elements, got {len(seed)}")
+    return [check_seed(each) for each in seed]
 
 
 def read_start(options: Mapping[str, Any] | None, simulation: Simulation) -> Array | None:
     """The start given in reset's options, as (num_rows, 6), or None.
 
     Raises:
-        ValueError: an unknown option, or a start of wrong shape, not finite, or beyond the limits of any variant.
+        ValueError: an unknown option, or a start without numbers, of wrong shape, not finite, or beyond the limits of
+            any variant.
     """
     num_rows, limits = simulation.num_rows, simulation.scenario.limits
     unknown = set(options or {}) - {START_OPTION}
@@ -62,7 +153,7 @@ def read_start(options: Mapping[str, Any] | None, simulation: Simulation) -> Arr
         raise ValueError(f"reset options: unknown {sorted(unknown)}; known: {START_OPTION}")
     if not options or START_OPTION not in options:
         return None
-    given = np.asarray(options[START_OPTION], float)
+    given = _numbers(options[START_OPTION], START_OPTION, np.float64)
     if given.shape not in ((6,), (num_rows, 6)):
         raise ValueError(f"{START_OPTION}: shape must be (6,) or ({num_rows}, 6), got {given.shape}")
     if not np.isfinite(given).all():
@@ -73,7 +164,7 @@ def read_start(options: Mapping[str, Any] | None, simulation: Simulation) -> Arr
     distances_m = np.linalg.norm(position[..., None, :] - simulation.first_references_m, axis=-1)
     if (distances_m > limits.max_distance_m).any():
         raise ValueError(f"{START_OPTION}: farther than {limits.max_distance_m:g} m from the reference: {given}")
-    if (speed > min(flown.orbit.speed_m_s for flown in simulation.variants)).any():
+    if (speed > min(each.orbit.speed_m_s for each in simulation.variants)).any():
         raise ValueError(f"{START_OPTION}: faster than the orbit itself: {given}")
     return np.broadcast_to(given, (num_rows, 6))
 
@@ -84,7 +175,7 @@ def check_action(action: Any) -> NDArray[np.float32]:
     Raises:
         ValueError: wrong shape, no numbers, or not finite.
     """
-    array = _numbers(action, "action")
+    array = _numbers(action, "action", np.float32)
     if array.shape != (3,) or not isfinite(sum(array.tolist())):  # faster than numpy for three numbers
         raise ValueError(f"action: must be finite with shape (3,), got shape {array.shape}: {array}")
     return array
@@ -96,7 +187,7 @@ def check_actions(actions: Any, num_rows: int) -> NDArray[np.float32]:
     Raises:
         ValueError: wrong shape, no numbers, or not finite; then it names the first row that is wrong.
     """
-    array = _numbers(actions, "actions")
+    array = _numbers(actions, "actions", np.float32)
     if array.shape != (num_rows, 3):
         raise ValueError(f"actions: shape must be ({num_rows}, 3), got {array.shape}")
     if not np.isfinite(array).all():
@@ -105,15 +196,30 @@ def check_actions(actions: Any, num_rows: int) -> NDArray[np.float32]:
     return array
 
 
-def _numbers(values: Any, name: str) -> NDArray[np.float32]:
-    """Values as float32; never read out of strings or flags."""
+def _numbers(values: Any, name: str, dtype: type[Any]) -> NDArray[Any]:
+    """Values as an array of floats; strings and flags are not taken as numbers.
+
+    Raises:
+        ValueError: no numbers, or an array of another library that numpy cannot read.
+    """
+    if isinstance(values, (list, tuple)) and _holds_flag(values):
+        raise ValueError(f"{name}: must be numbers, got {reprlib.repr(values)}")
     try:
         array = np.asarray(values)
     except ValueError:  # a ragged list
         array = np.empty(0, object)
-    if array.dtype.char == "f":
+    except (TypeError, RuntimeError) as error:  # a tensor that needs gradients, has no numpy type or is on a device
+        raise ValueError(f"{name}: must be numbers that numpy can read: {' '.join(str(error).split())}") from error
+    if array.dtype == dtype:
         return array
     if array.dtype.kind not in "fiu":
         raise ValueError(f"{name}: must be numbers, got {reprlib.repr(values)}")
-    with np.errstate(over="ignore"):  # what is too large is infinite then, and refused as such
-        return array.astype(np.float32)
+    with np.errstate(over="ignore"):  # values that are too large become infinite, and are refused as such
+        return array.astype(dtype)
+
+
+def _holds_flag(values: Any) -> bool:
+    """Whether a list of numbers, or of such lists, holds a bool (numpy would read it as 0 or 1)."""
+    if isinstance(values, (list, tuple)):
+        return any(_holds_flag(value) for value in values)
+    return isinstance(values, (bool, np.bool_))

@@ -6,22 +6,19 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from formation_env.envs import interface
-from formation_env.kernel import tile as field
 from formation_env.kernel.metrics import episode_metrics
 from formation_env.kernel.simulation import Simulation
-from formation_env.numerics.jit import LANES
 from formation_env.rendering.modes import FRAMES_PER_S, RENDER_MODES
+from formation_env.rendering.moment import Trail
 from formation_env.task.loading import load_scenario
 from formation_env.task.scenario import Scenario
 
 Observation = NDArray[np.float32]
 
-_REWARD, _TERMINATED, _TRUNCATED, _THRUST = (
-    (offset - field.RESULTS) // LANES for offset in (field.REWARD, field.TERMINATED, field.TRUNCATED, field.THRUST)
-)
 _ONLY_ROW = np.zeros(1, np.intp)
 
 
@@ -36,12 +33,17 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": FRAMES_PER_S}  # noqa: RUF012
 
-    def __init__(self, scenario: str | Path | Scenario = "keeping", render_mode: str | None = None) -> None:
+    @interface.known_arguments
+    def __init__(
+        self, scenario: str | Path | Scenario = "keeping", render_mode: str | None = None, analysis: bool = False
+    ) -> None:
         """Make the environment.
 
         Args:
             scenario: a name, a path of a YAML file, or a Scenario.
             render_mode: None, `rgb_array` or `human`.
+            analysis: whether infos also hold the simulated `measurement` (whether or not it was received, which
+                `measured` tells), `process_noise_m_s2` and `thrust_noise`, see `kernel.simulation.StepNoises`.
 
         Raises:
             ConfigError: the scenario is wrong.
@@ -50,13 +52,28 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"render_mode: must be one of {self.metadata['render_modes']}, got {render_mode!r}")
         self.scenario = load_scenario(scenario)
+        self._spec: EnvSpec | None = None
         self.render_mode = render_mode
         self.action_space = interface.action_space()
         self.observation_space = interface.observation_space()
         self.simulation = Simulation(self.scenario, 1)
         self._info_scalars = interface.info_scalars(self.scenario)
+        self._analysis = analysis
         self._keyed = False
         self._renderer: Any = None
+        self._trail = None if render_mode is None else Trail(self.scenario)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """Gymnasium's spec of the environment; `max_episode_steps` is the length of the scenario's plan.
+
+        No `TimeLimit` enforces it, since the environment itself truncates there.
+        """
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = interface.with_length(spec, self.scenario.num_steps)
 
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
@@ -64,12 +81,13 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Begin an episode.
 
         Args:
-            seed: of a new random stream; without it the stream goes on.
+            seed: seed of a new random stream; without it the present stream continues.
             options: `initial_state`: the true LVLH state (6,) to start at, m and m/s.
 
         Raises:
-            ValueError: wrong options.
+            ValueError: wrong options or seed.
         """
+        seed = interface.check_seed(seed)
         starts = interface.read_start(options, self.simulation)
         super().reset(seed=seed)
         if seed is not None or not self._keyed:
@@ -79,15 +97,16 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.simulation.reset(_ONLY_ROW, observations, starts)
         if self._renderer is not None:
             self._renderer.restart()
-        if self.render_mode == "human":
-            self.render()
-        return observations[0], self._info(self.simulation.results[:, 0].tolist())
+        if self._trail is not None:
+            self._trail.clear()
+            self._show(self._trail)
+        return observations[0], self._info(self.simulation.first_row_results())
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Fly one step.
 
         Args:
-            action: (3,), in units of max_accel_m_s2, cut to [-1, 1].
+            action: (3,), in units of max_accel_m_s2, clipped to [-1, 1].
 
         Raises:
             ValueError: the action has a wrong shape or is not finite; nothing has changed then.
@@ -100,35 +119,46 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         simulation.actions[0] = action
         observations = simulation.new_observations()
         simulation.step(observations)
-        values = simulation.results[:, 0].tolist()
+        values = simulation.first_row_results()
         info = self._info(values)
-        terminated, truncated = values[_TERMINATED] > 0.5, values[_TRUNCATED] > 0.5
+        terminated, truncated = values["terminated"] > 0.5, values["truncated"] > 0.5
         if terminated or truncated:
             info[interface.TOTALS] = {name: float(value[0]) for name, value in episode_metrics(simulation).items()}
-        if self.render_mode == "human":
-            self.render()
-        return observations[0], values[_REWARD], terminated, truncated, info
+        if self._trail is not None:
+            self._show(self._trail)
+        return observations[0], values["reward"], terminated, truncated, info
 
-    def _info(self, values: list[float]) -> dict[str, Any]:
-        """Info of the last step, from the results (fields,) of the one row."""
-        info: dict[str, Any] = {
-            name: self.simulation.row_state(offset, size) for name, (offset, size) in interface.INFO_STATES.items()
-        }
-        info[interface.INFO_THRUST] = np.array(values[_THRUST : _THRUST + 3])
-        for name, (offset, kind) in self._info_scalars.items():
-            info[name] = kind(values[(offset - field.RESULTS) // LANES])
+    def _info(self, values: dict[str, float]) -> dict[str, Any]:
+        """Info of the last step, from the results of the one row."""
+        simulation = self.simulation
+        info: dict[str, Any] = {name: simulation.first_row_state(name) for name in interface.INFO_STATES}
+        info[interface.INFO_THRUST] = np.array([values["thrust_x"], values["thrust_y"], values["thrust_z"]])
+        for name, (result, kind) in self._info_scalars.items():
+            info[name] = kind(values[result])
+        if self._analysis:
+            info |= {name: value[0] for name, value in interface.analysis_infos(simulation).items()}
         return info
 
+    def _show(self, trail: Trail) -> None:
+        """Record where the follower is now; in mode `human` draw it."""
+        trail.record(self.simulation)
+        if self.render_mode == "human":
+            self.render()
+
     def render(self) -> Any:
-        """The scene as an image (height, width, 3) uint8 in mode `rgb_array`; shown in mode `human`."""
-        if self.render_mode is None:
+        """The scene as an image (height, width, 3) uint8 in mode `rgb_array`; shown in a window in mode `human`.
+
+        Raises:
+            RuntimeError: mode `human` without a display.
+        """
+        if self._trail is None:
             gymnasium.logger.warn("render: make the environment with render_mode='rgb_array' or 'human' first")
             return None
         if self._renderer is None:
             from formation_env.rendering.renderer import Renderer
 
-            self._renderer = Renderer(self.scenario, self.render_mode)
-        return self._renderer.draw(self.simulation)
+            self._renderer = Renderer(self.scenario, str(self.render_mode))
+        return self._renderer.draw(self.simulation, self._trail)
 
     def close(self) -> None:
         """Close the window, if there is one."""

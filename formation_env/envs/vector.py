@@ -1,19 +1,20 @@
 """The batched environment: many rows of a simulation."""
 
+import reprlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from formation_env.envs import interface
-from formation_env.kernel import tile as field
 from formation_env.kernel.metrics import episode_metrics
-from formation_env.kernel.simulation import Rows, Simulation
+from formation_env.kernel.simulation import ALL_ROWS, Rows, Simulation
 from formation_env.task.loading import load_scenario
 from formation_env.task.scenario import Scenario
 
@@ -26,34 +27,51 @@ MASK_OPTION: Final = "reset_mask"
 class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
     """Many followers, each in an episode of its own; row i equals, bit for bit, a single environment with its seed.
 
-    A row that ends is reset in the same step; its last observation and info are in `final_obs` and `final_info`.
+    A row that ends is reset as `autoreset_mode` says, in Gymnasium's terms:
+        SAME_STEP: in the same step; its last observation and info are in `final_obs` and `final_info`.
+        NEXT_STEP: by the next call of `step`, which ignores the row's action and gives it reward 0.
+        DISABLED: by the user, with `reset(options={"reset_mask": ...})`, before the next step.
     """
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.SAME_STEP}  # noqa: RUF012
 
+    @interface.known_arguments
     def __init__(
         self,
         num_envs: int = 1,
         scenario: str | Path | Scenario = "keeping",
         render_mode: str | None = None,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
+        max_episode_steps: int | None = None,
+        analysis: bool = False,
     ) -> None:
         """Make the environment.
 
         Args:
-            num_envs: rows.
+            num_envs: number of rows.
             scenario: a name, a path of a YAML file, or a Scenario.
             render_mode: None; render a single environment instead.
+            autoreset_mode: when rows that ended are reset; an `AutoresetMode` or its value.
+            max_episode_steps: truncate episodes after this many steps, if the plan is longer, as Gymnasium's
+                `TimeLimit` does for a single environment; such episodes have no `episode_totals`.
+            analysis: as of `FormationEnv`.
 
         Raises:
             ConfigError: the scenario is wrong.
-            ValueError: no rows, or a render mode.
+            ValueError: no rows, a render mode, an unknown autoreset mode or no steps.
         """
         if num_envs < 1:
             raise ValueError(f"num_envs: must be at least 1, got {num_envs}")
         if render_mode is not None:
             raise ValueError(f"render_mode: the batched environment has none, got {render_mode!r}")
+        if max_episode_steps is not None and max_episode_steps < 1:
+            raise ValueError(f"max_episode_steps: must be at least 1, got {max_episode_steps}")
+        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.scenario = load_scenario(scenario)
         self.num_envs = num_envs
+        self.max_episode_steps = min(max_episode_steps or self.scenario.num_steps, self.scenario.num_steps)
+        self._spec: EnvSpec | None = None
         self.render_mode = None
         self.single_action_space = interface.action_space()
         self.single_observation_space = interface.observation_space()
@@ -62,15 +80,29 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self.simulation = Simulation(self.scenario, num_envs)
         self._info_scalars = interface.info_scalars(self.scenario)
         self._observations = self.simulation.new_observations()
+        self._analysis = analysis
         self._keyed = False
+        self._ended = np.zeros(num_envs, bool)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """Gymnasium's spec of the environment; `max_episode_steps` is the length of an episode."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:
+        self._spec = interface.with_length(spec, self.max_episode_steps)
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | NDArray[np.integer] | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[Observations, dict[str, Any]]:
         """Begin an episode in all rows, or in those of a mask.
 
         Args:
-            seed: row i gets seed + i, or the i-th of a list; without a seed the rows' streams go on.
+            seed: row i gets seed + i, or the i-th of a list or array; without a seed the rows' streams continue.
             options: `initial_state`: true LVLH states (6,) or (num_envs, 6) to start at, m and m/s; `reset_mask`:
                 rows (num_envs,) to reset; the others stay as they are, return their last observation and have no info.
 
@@ -80,8 +112,12 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         others = dict(options or {})
         rows = self._rows(others.pop(MASK_OPTION, None))
         starts = interface.read_start(others, self.simulation)
-        self._seed(seed, rows)
+        seeds = interface.check_seeds(seed, self.num_envs)
+        if isinstance(seeds, range):
+            self._np_random, self._np_random_seed = gymnasium.utils.seeding.np_random(seeds.start)
+        self._seed(seeds, rows)
         self.simulation.reset(rows, self._observations, None if starts is None else starts[rows])
+        self._ended[rows] = False
         return self._observations.copy(), self._infos(rows if len(rows) < self.num_envs else slice(None))
 
     def _rows(self, mask: Any) -> NDArray[np.intp]:
@@ -95,50 +131,68 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             raise ValueError(f"{MASK_OPTION}: the first reset must be of all rows")
         return np.flatnonzero(mask)
 
-    def _seed(self, seed: int | Sequence[int | None] | None, rows: NDArray[np.intp]) -> None:
+    def _seed(self, seeds: Sequence[int | None], rows: NDArray[np.intp]) -> None:
         """Give streams to those of some rows that have a seed, or to all of them that have none yet."""
-        if isinstance(seed, (int, np.integer)):
-            seeds: Sequence[int | None] = range(int(seed), int(seed) + self.num_envs)
-            self._np_random, self._np_random_seed = gymnasium.utils.seeding.np_random(int(seed))
-        else:
-            seeds = [None] * self.num_envs if seed is None else seed
-        if len(seeds) != self.num_envs:
-            raise ValueError(f"seed: a list must have {self.num_envs} elements, got {len(seeds)}")
         keyed = [row for row in rows.tolist() if seeds[row] is not None or not self._keyed]
-        generators = [gymnasium.utils.seeding.np_random(seeds[row])[0] for row in keyed]
-        for row, generator in zip(keyed, generators, strict=True):
-            self.simulation.seed(row, generator)
+        for row in keyed:
+            self.simulation.seed(row, gymnasium.utils.seeding.np_random(seeds[row])[0])
         self._keyed = True
 
     def step(self, actions: Any) -> tuple[Observations, NDArray[np.float64], Flags, Flags, dict[str, Any]]:
-        """Fly one step in all rows; rows that end begin their next episode.
+        """Fly one step in all rows.
 
         Args:
-            actions: (num_envs, 3), in units of max_accel_m_s2, cut to [-1, 1].
+            actions: (num_envs, 3), in units of max_accel_m_s2, clipped to [-1, 1].
 
         Raises:
             ValueError: the actions have a wrong shape or are not finite (it names the row); nothing has changed then.
-            gymnasium.error.ResetNeeded: before the first reset.
+            gymnasium.error.ResetNeeded: before the first reset, or a row has ended and autoreset is disabled.
         """
         actions = interface.check_actions(actions, self.num_envs)
-        if not self._keyed:
-            raise gymnasium.error.ResetNeeded("step: call reset first")
+        waiting = np.flatnonzero(self._ended)
+        self._check_ready(waiting)
         simulation = self.simulation
         simulation.actions[:] = actions
         simulation.step(self._observations)
-        rewards = simulation.result(field.REWARD).copy()
-        terminations = simulation.result(field.TERMINATED) > 0.5
-        truncations = simulation.result(field.TRUNCATED) > 0.5
-        ended = np.flatnonzero(terminations | truncations)
-        finals = self._begin_next(ended) if len(ended) else {}
-        return self._observations.copy(), rewards, terminations, truncations, {**self._infos(), **finals}
+        if len(waiting):  # a reset overwrites the rows' step, and clears their flags
+            simulation.reset(waiting, self._observations)
+        rewards = simulation.read("reward")
+        rewards[waiting] = 0.0
+        terminations, truncations = simulation.read("terminated", dtype=bool), simulation.read("truncated", dtype=bool)
+        over = terminations | truncations
+        if self.max_episode_steps < self.scenario.num_steps:
+            truncations |= simulation.read("step") >= self.max_episode_steps
+        infos = self._end(terminations | truncations, over)
+        return self._observations.copy(), rewards, terminations, truncations, infos
 
-    def _begin_next(self, ended: NDArray[np.intp]) -> dict[str, Any]:
-        """Reset the rows that ended; what they ended with, in Gymnasium's form."""
-        final_info = self._infos(ended)
-        final_info |= self._spread(
-            {interface.TOTALS: self._spread(episode_metrics(self.simulation, ended), ended)}, ended
-        )
+    def _check_ready(self, waiting: NDArray[np.intp]) -> None:
+        """Refuse a step without a reset before it."""
+        if not self._keyed:
+            raise gymnasium.error.ResetNeeded("step: call reset first")
+        if len(waiting) and self.autoreset_mode is AutoresetMode.DISABLED:
+            rows = reprlib.repr(waiting.tolist())
+            raise gymnasium.error.ResetNeeded(
+                f"step: rows {rows} have ended; reset them with options={{'{MASK_OPTION}': mask}}"
+            )
+
+    def _end(self, ended: Flags, over: Flags) -> dict[str, Any]:
+        """Infos of a step, and what becomes of the rows that ended; those whose plan is `over` have totals."""
+        rows, totalled = np.flatnonzero(ended), np.flatnonzero(over)
+        if self.autoreset_mode is AutoresetMode.SAME_STEP:
+            finals = self._begin_next(rows, totalled) if len(rows) else {}
+            return {**self._infos(), **finals}
+        self._ended = ended
+        return {**self._infos(), **self._totals(totalled)}
+
+    def _totals(self, rows: NDArray[np.intp]) -> dict[str, Any]:
+        """Totals of rows that flew to their episode's end, in Gymnasium's form; nothing if there are none."""
+        if not len(rows):
+            return {}
+        return self._spread({interface.TOTALS: self._spread(episode_metrics(self.simulation, rows), rows)}, rows)
+
+    def _begin_next(self, ended: NDArray[np.intp], totalled: NDArray[np.intp]) -> dict[str, Any]:
+        """Reset the rows that ended; their last observations and infos, in Gymnasium's form."""
+        final_info = self._infos(ended) | self._totals(totalled)
         final_obs = np.full(self.num_envs, None, dtype=object)
         for row in ended.tolist():
             final_obs[row] = self._observations[row].copy()
@@ -146,15 +200,15 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         finals = self._spread({"final_info": final_info}, ended)
         return finals | {"final_obs": final_obs, "_final_obs": finals["_final_info"].copy()}
 
-    def _infos(self, rows: Rows = slice(None)) -> dict[str, Any]:
+    def _infos(self, rows: Rows = ALL_ROWS) -> dict[str, Any]:
         """Infos of some rows of the last step, in Gymnasium's form."""
         simulation = self.simulation
-        infos: dict[str, Any] = {
-            name: simulation.state(offset, size, rows) for name, (offset, size) in interface.INFO_STATES.items()
-        }
-        infos[interface.INFO_THRUST] = simulation.result_vector(field.THRUST, 3, rows)
-        for name, (offset, kind) in self._info_scalars.items():
-            infos[name] = simulation.result(offset, rows).astype(kind)
+        infos: dict[str, Any] = {name: simulation.read(name, rows) for name in interface.INFO_STATES}
+        infos[interface.INFO_THRUST] = simulation.read("thrust", rows)
+        for name, (result, kind) in self._info_scalars.items():
+            infos[name] = simulation.read(result, rows, kind)
+        if self._analysis:
+            infos |= interface.analysis_infos(simulation, rows)
         return self._spread(infos, rows)
 
     def _spread(self, values: dict[str, Any], rows: Rows) -> dict[str, Any]:
@@ -169,3 +223,16 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
                 spread[name][rows] = value
             spread[f"_{name}"] = mask
         return spread
+
+
+def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
+    """An autoreset mode, which may be given by its value.
+
+    Raises:
+        ValueError: there is no such mode.
+    """
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        known = [each.value for each in AutoresetMode]
+        raise ValueError(f"autoreset_mode: must be one of {known}, got {mode!r}") from None

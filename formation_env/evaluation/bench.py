@@ -1,10 +1,10 @@
-"""How fast the environments step, beside Gymnasium's own in the same run, so that the ratio means something."""
+"""Throughput of the environments, relative to Gymnasium's own environments measured in the same run."""
 
 import itertools
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, Final
 
 import gymnasium
@@ -12,58 +12,72 @@ import pandas as pd
 
 from formation_env.task.loading import ENV_IDS
 
-RIVALS: Final = ("CartPole-v1", "Pendulum-v1")
-VARIANTS: Final = {"keeping_nonlinear": "FormationKeeping-v0"}
-"""Scenarios that are measured beside the ids' own, and the id that flies them."""
+REFERENCE: Final = "CartPole-v1"
+"""The environment that the ratios refer to."""
+REFERENCES: Final = (REFERENCE, "Pendulum-v1")
+"""Gymnasium's environments measured beside ours."""
+DEFAULT: Final = (*ENV_IDS, "keeping_nonlinear")
+"""Environments that are measured unless others are named."""
+_SINGLE_STEPS: Final = 3000
+_BATCH_STEPS: Final = 400
 _ROUNDS: Final = 5
+_BATCH_ROUNDS: Final = 3
 _ACTIONS: Final = 64
+"""Random actions drawn beforehand, so that sampling does not count."""
 
 
-def single_stepper(env_id: str, steps: int) -> Callable[[], int]:
-    """A function that takes some steps in one environment made with `gymnasium.make`; it returns how many.
+def single_stepper(env: str, steps: int) -> Callable[[], int]:
+    """A function that steps one environment made with `gymnasium.make`, and returns the number of steps.
 
     Args:
-        env_id: an id, or one of `VARIANTS`.
-        steps: how many each call takes.
+        env: a registered id, of Gymnasium's too, or a scenario's name or path.
+        steps: steps per call.
     """
-    env: gymnasium.Env[Any, Any] = gymnasium.make(VARIANTS.get(env_id, env_id), **_scenario(env_id))
-    env.reset(seed=0)
-    env.action_space.seed(0)
-    actions = itertools.cycle([env.action_space.sample() for _ in range(_ACTIONS)])
+    env_id, arguments = _made_of(env)
+    made: gymnasium.Env[Any, Any] = gymnasium.make(env_id, **arguments)
+    made.reset(seed=0)
+    made.action_space.seed(0)
+    actions = itertools.cycle([made.action_space.sample() for _ in range(_ACTIONS)])
 
     def run() -> int:
         for action in itertools.islice(actions, steps):
-            _, _, terminated, truncated, _ = env.step(action)
+            _, _, terminated, truncated, _ = made.step(action)
             if terminated or truncated:
-                env.reset()
+                made.reset()
         return steps
 
     return run
 
 
-def batch_stepper(env_id: str, rows: int, steps: int) -> Callable[[], int]:
-    """The same for the batched environment; a step of all rows counts as many."""
-    kind = VARIANTS.get(env_id, env_id)
-    env = gymnasium.make_vec(kind, rows, vectorization_mode="vector_entry_point", **_scenario(env_id))
-    env.reset(seed=0)
-    env.action_space.seed(0)
-    actions = itertools.cycle([env.action_space.sample() for _ in range(_ACTIONS)])
+def batch_stepper(env: str, rows: int, steps: int) -> Callable[[], int]:
+    """A function that steps a batched environment, and returns the number of steps of all rows.
+
+    Args:
+        env: as of `single_stepper`.
+        rows: rows of the batch.
+        steps: steps per call.
+    """
+    env_id, arguments = _made_of(env)
+    made = gymnasium.make_vec(env_id, rows, vectorization_mode="vector_entry_point", **arguments)
+    made.reset(seed=0)
+    made.action_space.seed(0)
+    actions = itertools.cycle([made.action_space.sample() for _ in range(_ACTIONS)])
 
     def run() -> int:
         for action in itertools.islice(actions, steps):
-            env.step(action)
+            made.step(action)
         return steps * rows
 
     return run
 
 
-def _scenario(env_id: str) -> dict[str, Any]:
-    """Arguments of a variant's environment."""
-    return {"scenario": env_id} if env_id in VARIANTS else {}
+def _made_of(env: str) -> tuple[str, dict[str, Any]]:
+    """The id and the arguments that make an environment."""
+    return (env, {}) if env in gymnasium.registry else (next(iter(ENV_IDS)), {"scenario": env})
 
 
 def rates(steppers: dict[str, Callable[[], int]], rounds: int = _ROUNDS) -> dict[str, float]:
-    """Steps per second of each, the best of some rounds in which all take turns (the clock of a machine is noisy)."""
+    """Steps per second of each stepper: the best of some rounds in which all take turns, since clock rates vary."""
     best = dict.fromkeys(steppers, 0.0)
     for _ in range(rounds):
         for name, run in steppers.items():
@@ -74,7 +88,7 @@ def rates(steppers: dict[str, Callable[[], int]], rounds: int = _ROUNDS) -> dict
 
 
 def startup() -> dict[str, float]:
-    """Seconds of a new process to import the package, and to its first reset and step (compiled code is cached)."""
+    """Seconds that a new process takes to import the package and to fly its first steps (compiled code is cached)."""
     code = (
         "import time; a = time.perf_counter(); import formation_env; b = time.perf_counter();"
         "e = formation_env.FormationEnv(); e.reset(seed=0); e.step([0, 0, 0]); c = time.perf_counter();"
@@ -86,20 +100,27 @@ def startup() -> dict[str, float]:
 
 
 def learning() -> int:
-    """Have `agents`, which nothing here imports, print how fast PPO learns; its exit status."""
+    """Run `agents bench`, which prints PPO's throughput, in a process of its own; returns its exit status."""
     return subprocess.call([sys.executable, "-m", "agents", "bench"])
 
 
-def table(rows: int) -> pd.DataFrame:
-    """Rates of all environments: columns steps_per_s and ratios to CartPole, for one environment and for a batch.
+def table(rows: int, envs: Sequence[str] = DEFAULT) -> pd.DataFrame:
+    """Steps per second, and their ratio to CartPole's, single and in a batch.
 
-    The actions are random, and the steps span whole episodes, so resets have their share.
+    The actions are random, and the steps span whole episodes, so the time of resets is included.
+
+    Args:
+        rows: rows of the batches.
+        envs: registered ids, or scenarios' names or paths.
+
+    Returns:
+        Columns: faces, env, steps_per_s, x_cartpole.
     """
-    singles = rates({env_id: single_stepper(env_id, 3000) for env_id in (*ENV_IDS, *VARIANTS, *RIVALS)})
-    batches = rates({env_id: batch_stepper(env_id, rows, 400) for env_id in (*ENV_IDS, *VARIANTS, RIVALS[0])}, rounds=3)
+    singles = rates({env: single_stepper(env, _SINGLE_STEPS) for env in (*envs, *REFERENCES)})
+    batches = rates({env: batch_stepper(env, rows, _BATCH_STEPS) for env in (*envs, REFERENCE)}, _BATCH_ROUNDS)
     lines = [
-        {"faces": faces, "env": env_id, "steps_per_s": rate, "x_cartpole": rate / group[RIVALS[0]]}
+        {"faces": faces, "env": env, "steps_per_s": rate, "x_cartpole": rate / group[REFERENCE]}
         for faces, group in (("single", singles), (f"batch of {rows}", batches))
-        for env_id, rate in group.items()
+        for env, rate in group.items()
     ]
     return pd.DataFrame(lines)

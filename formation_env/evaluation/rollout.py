@@ -1,4 +1,4 @@
-"""Episodes flown by a policy: one row per seed, summaries with confidence intervals, and single flights to look at."""
+"""Rollouts of a policy: metrics of one episode per seed, and all instants of a single flight."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -14,11 +14,11 @@ from formation_env.task.loading import load_scenario
 from formation_env.task.scenario import Scenario
 
 MAX_ROWS: Final = 4096
-"""Episodes flown side by side."""
+"""Episodes stepped side by side; more seeds are flown in several batches."""
 
 
 class Policy(Protocol):
-    """Anything with Stable-Baselines3's `predict`."""
+    """A policy with the `predict` method of Stable-Baselines3."""
 
     def predict(
         self,
@@ -40,7 +40,7 @@ def evaluate(
     """Fly one episode per seed on the batched environment.
 
     Args:
-        policy: what chooses the actions, deterministically.
+        policy: chooses the actions, deterministically; its `state` may be of any type.
         env_id_or_scenario: a registered id, a scenario's name or path, or a Scenario.
         seeds: one per episode; the same seeds give the same starts, noises and dropouts to every policy.
         progress: called with the number of episode-steps flown since the last call.
@@ -79,7 +79,7 @@ def _fly(policy: Policy, scenario: Scenario, seeds: list[int], progress: Callabl
 
 
 def record(policy: Policy, env_id_or_scenario: str | Path | Scenario, seed: int) -> pd.DataFrame:
-    """Fly one episode and keep every instant.
+    """Fly one episode and record every instant.
 
     Returns:
         One line per instant from the start on: time_s, the true state (x_m, y_m, z_m, vx_m_s, vy_m_s, vz_m_s), its

@@ -1,4 +1,4 @@
-"""Disjoint ranges of episode seeds, so that nothing is judged on what it was tuned on."""
+"""Disjoint ranges of episode seeds: no policy is tested on seeds that it was trained or tuned on."""
 
 from typing import Final, Literal
 
@@ -12,12 +12,12 @@ def seeds(split: Split, count: int) -> range:
     """The first seeds of a split.
 
     Args:
-        split: `test` for reports, `validation` to choose among trained models, `tuning` for controllers' gains,
+        split: `test` for reports, `validation` to choose among trained models, `tuning` for controllers' settings,
             `training` for learning.
-        count: how many.
+        count: number of seeds.
 
     Raises:
-        ValueError: there are not so many.
+        ValueError: the split has fewer seeds.
     """
     if not 1 <= count <= _SIZE:
         raise ValueError(f"seeds: count must be between 1 and {_SIZE}, got {count}")

@@ -1,5 +1,6 @@
-"""One frame of a flight, as a file."""
+"""A frame of a flight, as a PNG file."""
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -20,36 +21,46 @@ def save_frame(
     seed: int = 0,
     policy: Policy | None = None,
 ) -> Path:
-    """Fly, and write the last frame as a PNG file.
+    """Fly some steps, and save the last frame.
 
     Args:
-        out: the file, written whole or not at all.
+        out: the file, NAME.png, written whole or not at all.
         env_id_or_scenario: a registered id, a scenario's name or path, or a Scenario.
-        steps: how many to fly; the flight may end earlier.
-        seed: of the episode.
-        policy: what chooses the actions; without one the follower coasts.
+        steps: number of steps to fly; a warning says so if a limit ends the flight earlier.
+        seed: seed of the episode.
+        policy: chooses the actions; without one the follower coasts.
 
     Returns:
         The file's path.
 
     Raises:
-        ValueError: a negative number of steps.
+        ValueError: a file that does not end in .png, or a number of steps that the scenario's plan does not have.
     """
-    if steps < 0:
-        raise ValueError(f"steps: must be >= 0, got {steps}")
-    env = FormationEnv(load_scenario(env_id_or_scenario), render_mode="rgb_array")
+    path, scenario = Path(out), load_scenario(env_id_or_scenario)
+    if path.suffix.lower() != ".png":
+        raise ValueError(f"out: must end in .png, got {str(path)!r}")
+    if not 0 <= steps <= scenario.num_steps:
+        raise ValueError(f"steps: must be between 0 and the plan's {scenario.num_steps}, got {steps}")
+    env = FormationEnv(scenario, render_mode="rgb_array")
+    flown = _fly(env, steps, seed, policy)
+    if flown < steps:
+        warnings.warn(f"the flight ended at step {flown} of {steps}, beyond a limit of the scenario", stacklevel=2)
+    frame = env.render()
+    with replacing(path) as temporary:
+        imsave(temporary, frame, format="png", dpi=DPI)
+    return path
+
+
+def _fly(env: FormationEnv, steps: int, seed: int, policy: Policy | None) -> int:
+    """Fly an episode's first steps; returns how many there were before it ended."""
     observation, _ = env.reset(seed=seed)
-    frame, state = env.render(), None
+    state = None
     for step in range(steps):
         action = np.zeros(3, np.float32)
         if policy is not None:
             starts = np.full(1, step == 0)
             action, state = policy.predict(observation, state=state, episode_start=starts, deterministic=True)
         observation, _, terminated, truncated, _ = env.step(action)
-        frame = env.render()
         if terminated or truncated:
-            break
-    path = Path(out)
-    with replacing(path) as temporary:
-        imsave(temporary, frame, format="png", dpi=DPI)
-    return path
+            return step + 1
+    return steps

@@ -7,6 +7,8 @@ their measurement errors; so their covariances have no common elements and they 
 is a tuple of its upper triangle, row by row. Measurements are independent, so they are taken one at a time.
 """
 
+from typing import Final
+
 from formation_env.numerics.fastmath import fma
 from formation_env.numerics.jit import inline_scalar
 
@@ -14,6 +16,21 @@ Symmetric2 = tuple[float, float, float]
 Symmetric4 = tuple[float, float, float, float, float, float, float, float, float, float]
 State4 = tuple[float, float, float, float]
 Matrix2 = tuple[float, float, float, float]
+
+LEAST_SHARE: Final = 2.0**-26
+"""Least share of an unmeasured element's variance that one measurement leaves.
+
+It is the square root of a double's rounding: a variance below it is a difference that has lost half of its digits, and
+the next measurement would lose the other half and find a negative one. Such a variance is too large then, which is
+safe, and a few measurements later right.
+"""
+LEAST_VARIANCE: Final = 1e-20
+"""Least variance of a measurement, m^2 and m^2/s^2: the rounding of a perfect one."""
+
+
+@inline_scalar
+def _at_least(value: float, floor: float) -> float:
+    return value if value > floor else floor
 
 
 @inline_scalar
@@ -23,7 +40,11 @@ def time_update_2(P: Symmetric2, Phi: Matrix2, Q_noise: Symmetric2) -> Symmetric
     a, b, c, d = Phi
     u0, u1 = a * p00 + b * p01, a * p01 + b * p11
     v0, v1 = c * p00 + d * p01, c * p01 + d * p11
-    return u0 * a + u1 * b + Q_noise[0], u0 * c + u1 * d + Q_noise[1], v0 * c + v1 * d + Q_noise[2]
+    return (
+        _at_least(u0 * a + u1 * b, 0.0) + Q_noise[0],
+        u0 * c + u1 * d + Q_noise[1],
+        _at_least(v0 * c + v1 * d, 0.0) + Q_noise[2],
+    )
 
 
 @inline_scalar
@@ -53,16 +74,16 @@ def time_update_4(P: Symmetric4, Phi: tuple[float, ...], Q_noise: Symmetric4) ->
     c = _times_symmetric(c0, c1, c2, c3, P)
     d = _times_symmetric(d0, d1, d2, d3, P)
     return (
-        _dot(a, a0, a1, a2, a3) + Q_noise[0],
+        _at_least(_dot(a, a0, a1, a2, a3), 0.0) + Q_noise[0],
         _dot(a, b0, b1, b2, b3) + Q_noise[1],
         _dot(a, c0, c1, c2, c3) + Q_noise[2],
         _dot(a, d0, d1, d2, d3) + Q_noise[3],
-        _dot(b, b0, b1, b2, b3) + Q_noise[4],
+        _at_least(_dot(b, b0, b1, b2, b3), 0.0) + Q_noise[4],
         _dot(b, c0, c1, c2, c3) + Q_noise[5],
         _dot(b, d0, d1, d2, d3) + Q_noise[6],
-        _dot(c, c0, c1, c2, c3) + Q_noise[7],
+        _at_least(_dot(c, c0, c1, c2, c3), 0.0) + Q_noise[7],
         _dot(c, d0, d1, d2, d3) + Q_noise[8],
-        _dot(d, d0, d1, d2, d3) + Q_noise[9],
+        _at_least(_dot(d, d0, d1, d2, d3), 0.0) + Q_noise[9],
     )
 
 
@@ -105,7 +126,10 @@ def measure_first(
 
     The measured element's row of the covariance takes Joseph's form, (I - K H) P (I - K H)' + K R_noise K', where
     (I - K H) P would cancel; the rest is P - K H P, to which Joseph's form reduces for this gain. It is symmetric by
-    construction.
+    construction, and no variance becomes negative, see `LEAST_SHARE`.
+
+    A sensor without noise is always believed, also where the covariance of the element is 0 and eq. (4.71) divides zero
+    by zero: its variance counts as `LEAST_VARIANCE`.
 
     Args:
         x_hat: estimate (4).
@@ -119,10 +143,14 @@ def measure_first(
     """
     x0, x1, x2, x3 = x_hat
     p00, p01, p02, p03, p11, p12, p13, p22, p23, p33 = P
+    perfect = variance <= LEAST_VARIANCE
+    variance = _at_least(variance, LEAST_VARIANCE)
     s = p00 + variance
-    weight = received / s if s > 0.0 else 0.0
+    weight = received / s
     innovation = z - x0
-    k0, k1, k2, k3 = p00 * weight, p01 * weight, p02 * weight, p03 * weight
+    # K = P H' / s
+    k0 = received if perfect else p00 * weight
+    k1, k2, k3 = p01 * weight, p02 * weight, p03 * weight
     rest = 1.0 - k0
     new_x = (x0 + k0 * innovation, x1 + k1 * innovation, x2 + k2 * innovation, x3 + k3 * innovation)
     new_P = (
@@ -130,12 +158,12 @@ def measure_first(
         rest * (p01 - k1 * p00) + k0 * k1 * variance,
         rest * (p02 - k2 * p00) + k0 * k2 * variance,
         rest * (p03 - k3 * p00) + k0 * k3 * variance,
-        fma(-k1, p01, p11),
+        _at_least(fma(-k1, p01, p11), LEAST_SHARE * p11),
         fma(-k1, p02, p12),
         fma(-k1, p03, p13),
-        fma(-k2, p02, p22),
+        _at_least(fma(-k2, p02, p22), LEAST_SHARE * p22),
         fma(-k2, p03, p23),
-        fma(-k3, p03, p33),
+        _at_least(fma(-k3, p03, p33), LEAST_SHARE * p33),
     )
     return new_x, new_P, innovation * innovation * weight
 

@@ -1,33 +1,34 @@
-"""What is said of an episode once it has ended. To add a metric: a function here, and a line in `METRICS`."""
+"""Metrics of an episode. To add one: a formula here, and a line in `METRICS`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
-from formation_env.kernel import tile as field
-from formation_env.kernel.simulation import Rows, Simulation
+from formation_env.kernel.simulation import ALL_ROWS, Rows, Simulation
 from formation_env.numerics.arrays import Array
-from formation_env.numerics.jit import LANES
 from formation_env.task.schedule import OFFSETS
 
 
 @dataclass(frozen=True)
-class Sums:
-    """What the kernel has added up over episodes, each (rows,).
+class EpisodeTotals:
+    """Totals of episodes, each (rows,).
+
+    All errors follow one rule: an early end counts the instants left as flown at the distance limit (or at the last
+    error, if that is greater).
 
     Attributes:
         steps: steps flown.
         reward: sum of rewards, m/s.
         delta_v_m_s: sum of delta-v.
-        error_m: sum of position errors over the steps of the hold.
-        square_m2: sum of their squares.
-        max_error_m: greatest of them.
-        arrival_error_m: mean error at the ends of the transfers.
-        final_error_m: error at the last step.
+        error_m: sum of position errors over the hold.
+        square_m2: sum of squared position errors over the hold.
+        max_error_m: greatest position error of the hold.
+        arrival_error_m: mean position error at the ends of the transfers.
+        final_error_m: position error at the end of the plan.
         tolerated: steps of the hold within the tolerance.
-        lost: measurements that did not arrive.
+        lost: measurements not received.
         hold_steps: steps of the whole hold.
     """
 
@@ -44,92 +45,93 @@ class Sums:
     hold_steps: Array
 
 
-def _return(sums: Sums) -> Array:
-    """Sum of rewards: minus (delta-v + weight * mean error), m/s."""
-    return sums.reward
+@dataclass(frozen=True)
+class Metric:
+    """A number per episode, and how tables show it.
 
-
-def _delta_v(sums: Sums) -> Array:
-    """Delta-v of the episode, m/s."""
-    return sums.delta_v_m_s
-
-
-def _mean_error(sums: Sums) -> Array:
-    """Mean position error over the hold, m; what an early end cut off counts as flown at the distance limit."""
-    return sums.error_m / sums.hold_steps
-
-
-def _rms_error(sums: Sums) -> Array:
-    """Root mean square of the same."""
-    return np.sqrt(sums.square_m2 / sums.hold_steps)
-
-
-def _max_error(sums: Sums) -> Array:
-    """Greatest of the same."""
-    return sums.max_error_m
-
-
-def _arrival_error(sums: Sums) -> Array:
-    """Position error at the end of the transfer, m; the mean if there are several, at the start if there is none.
-
-    What an early end cut off counts as at the distance limit.
+    Attributes:
+        name: column of `evaluate`'s table, key of `info["episode_totals"]`; it ends in the SI unit, if there is one.
+        heading: name in tables for people.
+        unit: unit in tables for people.
+        better: which values are better; None if neither is.
+        formula: from totals to values (rows,).
+        factor: from the value to the number in tables for people; negative for a cost that the table calls a return.
     """
-    return sums.arrival_error_m
+
+    name: str
+    heading: str
+    unit: str
+    better: Literal["lower", "higher"] | None
+    formula: Callable[[EpisodeTotals], Array]
+    factor: float = 1.0
 
 
-def _final_error(sums: Sums) -> Array:
-    """Position error at the last step, m."""
-    return sums.final_error_m
+def _return(totals: EpisodeTotals) -> Array:
+    """Sum of rewards: minus (delta-v + weight * mean error), m/s."""
+    return totals.reward
 
 
-def _tolerated(sums: Sums) -> Array:
+def _mean_error(totals: EpisodeTotals) -> Array:
+    """Mean position error over the hold, m."""
+    return totals.error_m / totals.hold_steps
+
+
+def _rms_error(totals: EpisodeTotals) -> Array:
+    """Root-mean-square position error over the hold, m."""
+    return np.sqrt(totals.square_m2 / totals.hold_steps)
+
+
+def _in_tolerance(totals: EpisodeTotals) -> Array:
     """Share of the hold within the scenario's tolerance."""
-    return sums.tolerated / sums.hold_steps
+    return totals.tolerated / totals.hold_steps
 
 
-def _lost(sums: Sums) -> Array:
-    """Share of measurements that did not arrive, the one at the start included."""
-    return sums.lost / (sums.steps + 1)
+def _lost(totals: EpisodeTotals) -> Array:
+    """Share of measurements not received, the one at the start included."""
+    return totals.lost / (totals.steps + 1)
 
 
-def _steps(sums: Sums) -> Array:
-    """Steps flown."""
-    return sums.steps
+_METRICS: Final = (
+    Metric("return", "cost", "m/s", "higher", _return, factor=-1.0),
+    Metric("delta_v_m_s", "Δv", "m/s", "lower", lambda totals: totals.delta_v_m_s),
+    Metric("position_error_mean_m", "mean error", "m", "lower", _mean_error),
+    Metric("position_error_rms_m", "rms error", "m", "lower", _rms_error),
+    Metric("position_error_max_m", "max error", "m", "lower", lambda totals: totals.max_error_m),
+    # mean over several transfers; at the start if there is none
+    Metric("position_error_arrival_m", "arrival error", "m", "lower", lambda totals: totals.arrival_error_m),
+    Metric("position_error_final_m", "final error", "m", "lower", lambda totals: totals.final_error_m),
+    Metric("in_tolerance", "in tolerance", "% of hold", "higher", _in_tolerance, factor=100.0),
+    Metric("measurements_lost", "data lost", "%", None, _lost, factor=100.0),
+    Metric("steps", "steps", "", None, lambda totals: totals.steps),
+)
+METRICS: Final = {metric.name: metric for metric in _METRICS}
+"""All metrics, by name."""
 
 
-METRICS: Final[dict[str, Callable[[Sums], Array]]] = {
-    "return": _return,
-    "delta_v_m_s": _delta_v,
-    "position_error_mean_m": _mean_error,
-    "position_error_rms_m": _rms_error,
-    "position_error_max_m": _max_error,
-    "position_error_arrival_m": _arrival_error,
-    "position_error_final_m": _final_error,
-    "in_tolerance": _tolerated,
-    "measurements_lost": _lost,
-    "steps": _steps,
-}
-
-
-def episode_metrics(simulation: Simulation, rows: Rows = slice(None)) -> dict[str, Array]:
+def episode_metrics(simulation: Simulation, rows: Rows = ALL_ROWS) -> dict[str, Array]:
     """Metrics of the episodes of some rows up to now, each (rows,)."""
-    totals: Array = simulation.state(field.FIRST_TOTAL, field.NUM_TOTALS, rows).T
-
-    def total(offset: int) -> Array:
-        column: Array = totals[(offset - field.FIRST_TOTAL) // LANES]
-        return column
-
-    sums = Sums(
-        steps=simulation.state(field.STEP, 1, rows)[:, 0],
-        reward=total(field.SUM_REWARD),
-        delta_v_m_s=total(field.SUM_DELTA_V),
-        error_m=total(field.SUM_ERROR),
-        square_m2=total(field.SUM_SQUARE),
-        max_error_m=total(field.MAX_ERROR),
-        arrival_error_m=total(field.ARRIVAL_ERROR),
-        final_error_m=simulation.result(field.POSITION_ERROR, rows).copy(),
-        tolerated=total(field.TOLERATED),
-        lost=total(field.LOST),
+    totals = simulation.totals(rows)
+    steps = simulation.read("step", rows)
+    episodes = EpisodeTotals(
+        steps=steps,
+        reward=totals["sum_reward"],
+        delta_v_m_s=totals["sum_delta_v"],
+        error_m=totals["sum_error"],
+        square_m2=totals["sum_square_error"],
+        max_error_m=totals["max_error"],
+        arrival_error_m=totals["arrival_error"],
+        final_error_m=_final_error(simulation, rows, steps),
+        tolerated=totals["tolerated"],
+        lost=totals["lost"],
         hold_steps=simulation.schedule[simulation.variant(rows), 0, OFFSETS["counts_left"]],
     )
-    return {name: metric(sums) for name, metric in METRICS.items()}
+    return {name: metric.formula(episodes) for name, metric in METRICS.items()}
+
+
+def _final_error(simulation: Simulation, rows: Rows, steps: Array) -> Array:
+    """Position error at the end of the plan (rows,); an early end counts as staying at the distance limit."""
+    error = simulation.read("position_error", rows)
+    plans = np.array([(each.num_steps, each.limits.max_distance_m) for each in simulation.variants])
+    num_steps, limit_m = plans[simulation.variant(rows)].T
+    early = simulation.read("terminated", rows, bool) & (steps < num_steps)
+    return np.where(early, np.maximum(error, limit_m), error)

@@ -278,7 +278,7 @@ def _forces(scenario: Scenario) -> Forces:
 
 
 def _scalars(scenario: Scenario) -> Scalars:
-    start, believed, reward = scenario.start, scenario.filter_model, scenario.reward
+    start, believed, cost = scenario.start, scenario.filter_model, scenario.reward.cost()
     chain = scenario.dropout.chain(scenario.dt_s, scenario.orbit)
     layout = observation_layout(scenario)
     return Scalars(
@@ -298,8 +298,8 @@ def _scalars(scenario: Scenario) -> Scalars:
         link_loss=chain.stationary_loss,
         link_fail=chain.fail,
         link_recover=chain.recover,
-        linear_cost=1.0 if reward.error_cost == "linear" else 0.0,
-        quadratic_cost=1 / reward.quadratic_scale_m if reward.error_cost == "quadratic" else 0.0,
+        linear_cost=cost.linear,
+        quadratic_cost=cost.quadratic,
         max_distance=scenario.limits.max_distance_m,
         keep_out=scenario.limits.keep_out_m,
         tolerance=scenario.tolerance_m,

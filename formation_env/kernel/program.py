@@ -3,9 +3,8 @@
 import hashlib
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,68 +13,79 @@ from formation_env.kernel import tile as field
 from formation_env.kernel.stages import kalman_filter, memory, noise, observe, reward, start, thruster, true_motion
 from formation_env.kernel.tile import Width
 from formation_env.numerics.arrays import Array
-from formation_env.numerics.jit import FAST_MATH, LANES
+from formation_env.numerics.jit import LANES, compiled_loop
 
-_RESET_BLOCK = 3  # a reset draws from blocks of its own, so that its first measurement is drawn like any other
+Float32 = NDArray[np.float32]
+
+_RESET_BLOCK: Final = 3  # a reset draws from blocks of its own, so that its first measurement is drawn like any other
 
 
 class Program(NamedTuple):
-    """The compiled functions for a kind of true motion and of the filter's model."""
+    """The compiled functions for a kind of true motion and of the filter's model.
+
+    Arguments that they share:
+        states: the rows' states (tiles, STATE_FIELDS * LANES), updated.
+        tile: scratch space for one tile (TILE_FIELDS * LANES,).
+        schedule: each variant's plan and varying models (variants, steps, columns), `packing.step_table`.
+        packed: each variant's settings (variants, SIZE), `packing.pack`.
+        observations: (rows, SIZE), written.
+        results: (NUM_RESULTS, tiles * LANES), written.
+        width: see `tile.Width`.
+
+    Attributes:
+        step: fly all rows over one step, under actions (rows, 3).
+        reset: start the next episode of the rows `rows` (k,), side by side in scratch space, from `starts`: states
+            (k, 6) to start at exactly if `given`, else each variant's nominal start (variants, 6).
+        redraw: draw the standard normals (NUM_NORMALS, tiles * LANES) of the last step or reset again.
+    """
 
     step: Any
     reset: Any
+    redraw: Any
 
 
 @cache
 def program(truth_kind: int, filter_kind: int, varied: bool) -> Program:
-    """The compiled step and reset for kinds of true motion and of the filter's model (see `packing`).
+    """The compiled functions for kinds of true motion and of the filter's model (see `packing`).
 
     Args:
-        truth_kind: of the true motion.
-        filter_kind: of the filter's model.
+        truth_kind: kind of the true motion.
+        filter_kind: kind of the filter's model.
         varied: whether rows fly different variants (see `variants`).
     """
-    return _compile(_source_hash(), truth_kind, filter_kind, varied)
+    sources = _source_hash()
+    return Program(_step(sources, truth_kind, filter_kind, varied), _reset(sources, varied), _redraw(sources))
 
 
-def _compile(source_hash: int, truth_kind: int, filter_kind: int, varied: bool) -> Program:
-    """Compile step and reset.
+# numba's cache looks only at the file of the outermost function; `source_hash`, a closure variable and so part of the
+# cache's key, makes it see the others too. A closure may hold numbers only, since functions are new in each process.
+# That is why a stage that depends on a kind is chosen by `if` on closure variables: numba drops the other branches
+# before it types them. The choice must stand in the outermost function, which therefore is longer than others.
 
-    numba's cache looks only at the file of the outermost function; the hash, which is part of the cache's key, makes it
-    see the others too. So is what else step and reset take from here: numbers, since functions are new in each process.
-    """
+
+def _step(source_hash: int, truth_kind: int, filter_kind: int, varied: bool) -> Any:
+    """Compile the step of all rows (see above for its length)."""
     behind_filter_model = field.TABLE + (packing.FILTER_SIZE * LANES if filter_kind == packing.TIME_VARYING else 0)
     constant_truth, constant_filter = truth_kind == packing.TIME_INVARIANT, filter_kind == packing.TIME_INVARIANT
     # Rows of different variants have models of their own, as rows at different steps have where models vary.
     one_truth, one_filter_model = constant_truth and not varied, constant_filter and not varied
     true_table = variants.TRUTH if constant_truth else behind_filter_model
     filter_table = variants.FILTER if constant_filter else field.TABLE
-    nonlinear = truth_kind in (packing.NONLINEAR_NEAR, packing.NONLINEAR_FAR)
-    compiled = numba.njit(cache=True, fastmath=FAST_MATH, error_model="numpy")
+    far = truth_kind == packing.NONLINEAR_FAR
+    nonlinear = far or truth_kind == packing.NONLINEAR_NEAR
 
-    @compiled
+    @compiled_loop
     def step(
         states: Array,
         tile: Array,
         schedule: Array,
         packed: Array,
-        actions: NDArray[np.float32],
-        observations: NDArray[np.float32],
+        actions: Float32,
+        observations: Float32,
         results: Array,
         width: Width,
     ) -> int:
-        """One step of all rows.
-
-        Args:
-            states: the rows' states (tiles, STATE_FIELDS * LANES), updated.
-            tile: scratch space for one tile (TILE_FIELDS * LANES,).
-            schedule: of each variant the plan and what differs from step to step, `packing.step_table`.
-            packed: of each variant, packed.
-            actions: (rows, 3).
-            observations: (rows, SIZE), written.
-            results: (NUM_RESULTS, tiles * LANES), written.
-            width: as long as the rows used of each tile.
-        """
+        """Fly all rows over one step; the arguments are those of `Program`."""
         if varied:
             true_dynamics, model, process, sensor, forces, settings = variants.nothing_shared()
         else:
@@ -85,8 +95,7 @@ def _compile(source_hash: int, truth_kind: int, filter_kind: int, varied: bool) 
             used = min(len(width), len(actions) - index * LANES)
             memory.load(tile, width, states, index, actions, used)
             if varied:
-                variants.draw(tile, width, len(packed))
-                variants.read(tile, width, schedule, packed)
+                variants.load(tile, width, schedule, packed)
             else:
                 known_step = memory.read_plan(tile, width, used, schedule[0], known_step)
             noise.draw(tile, width, 0)
@@ -94,9 +103,7 @@ def _compile(source_hash: int, truth_kind: int, filter_kind: int, varied: bool) 
             if one_truth:
                 true_motion.fly_linear(tile, width, true_dynamics, settings)
             elif nonlinear:
-                true_motion.fly_nonlinear(
-                    tile, width, true_table, truth_kind == packing.NONLINEAR_FAR, forces, settings
-                )
+                true_motion.fly_nonlinear(tile, width, true_table, far, forces, settings)
             else:
                 true_motion.fly_varying(tile, width, true_table, settings)
             if one_filter_model:
@@ -104,12 +111,18 @@ def _compile(source_hash: int, truth_kind: int, filter_kind: int, varied: bool) 
             else:
                 kalman_filter.predict_varying(tile, width, filter_table, settings)
             kalman_filter.measure(tile, width, sensor, settings)
-            reward.judge(tile, width, settings)
+            reward.score(tile, width, settings)
             observe.observe(tile, width, settings)
             memory.store(tile, width, states, index, observations, results, used)
         return source_hash
 
-    @compiled
+    return step
+
+
+def _reset(source_hash: int, varied: bool) -> Any:
+    """Compile the reset of some rows."""
+
+    @compiled_loop
     def reset(
         states: Array,
         tile: Array,
@@ -118,24 +131,11 @@ def _compile(source_hash: int, truth_kind: int, filter_kind: int, varied: bool) 
         rows: NDArray[np.intp],
         starts: Array,
         given: bool,
-        observations: NDArray[np.float32],
+        observations: Float32,
         results: Array,
         width: Width,
     ) -> int:
-        """Start the next episode of some rows, which are put side by side in scratch space.
-
-        Args:
-            states: as in `step`.
-            tile: as in `step`.
-            schedule: as in `step`.
-            packed: as in `step`.
-            rows: which rows (k,).
-            starts: states (k, 6) to start at, or those (variants, 6) to start about.
-            given: whether the rows start just there, not about it.
-            observations: written in these rows.
-            results: written in these rows.
-            width: as in `step`.
-        """
+        """Start the next episode of some rows; the arguments are those of `Program`."""
         if varied:
             _, _, _, sensor, _, settings = variants.nothing_shared()
         else:
@@ -143,8 +143,7 @@ def _compile(source_hash: int, truth_kind: int, filter_kind: int, varied: bool) 
         for first in range(0, len(rows), len(width)):
             memory.gather(tile, width, states, rows, first)
             if varied:
-                variants.draw(tile, width, len(packed))
-                variants.read(tile, width, schedule, packed)
+                variants.load(tile, width, schedule, packed)
             else:
                 memory.read_plan(tile, width, len(width), schedule[0], -1)
             start.place(tile, width, starts, given, first)
@@ -152,16 +151,30 @@ def _compile(source_hash: int, truth_kind: int, filter_kind: int, varied: bool) 
             start.begin(tile, width, given, settings)
             noise.draw(tile, width, 0)
             kalman_filter.measure(tile, width, sensor, settings)
-            reward.judge(tile, width, settings)
+            reward.score(tile, width, settings)
             observe.observe(tile, width, settings)
             memory.scatter(tile, width, states, rows, first, observations, results)
         return source_hash
 
-    return Program(step, reset)
+    return reset
 
 
-# Sources whose functions or constants are compiled into the program.
-COMPILED_SOURCES = (
+def _redraw(source_hash: int) -> Any:
+    """Compile the repeated draw of the last step's random numbers."""
+
+    @compiled_loop
+    def redraw(states: Array, tile: Array, normals: Array, width: Width) -> int:
+        """Draw all rows' standard normals again; the arguments are those of `Program`."""
+        for index in range(len(states)):
+            memory.load_streams(tile, width, states, index)
+            noise.draw(tile, width, 0)
+            memory.store_normals(tile, width, normals, index)
+        return source_hash
+
+    return redraw
+
+
+COMPILED_SOURCES: Final = (
     "kernel/**/*.py",
     "numerics/*.py",
     "orbital/constants.py",
@@ -170,10 +183,11 @@ COMPILED_SOURCES = (
     "task/observation.py",
     "task/schedule.py",
 )
+"""Sources whose functions or constants are compiled into the program."""
 
 
 def _source_hash() -> int:
-    """A number that changes with any source file that the compiled code comes from."""
+    """Hash of all source files that the compiled code comes from."""
     package = Path(__file__).parents[1]
     paths = sorted(path for pattern in COMPILED_SOURCES for path in package.glob(pattern))
     digest = hashlib.sha256(b"".join(path.read_bytes() for path in paths))

@@ -1,7 +1,7 @@
 """Rows that fly different variants of a scenario.
 
-Settings that all rows share are tuples of scalars, known outside the loop over the rows. With variants they are None
-there, and each row has its own in the tile: which of the two is a question of types, so settled when compiling.
+Settings that all rows share are tuples of scalars, known outside the loop over the rows. With variants they are None,
+and each row has its own in the tile; numba specialises on the type, so there is no run-time branch.
 """
 
 from typing import Any, Final
@@ -19,15 +19,15 @@ from formation_env.numerics.jit import LANES, inline_scalar, tile_function
 from formation_env.task.schedule import WIDTH
 
 TRUTH: Final = field.SETTINGS
-"""Where the tile has the rows' true models, if they do not vary from step to step."""
+"""Offset of the rows' true models in the tile, if they are time-invariant."""
 FILTER: Final = field.SETTINGS + packing.FILTER * LANES
-"""The same for the filter's model and process noise."""
-_COUNTER: Final = np.uint64(6)  # behind the blocks of a step and of a reset, in what would be the numbers of step 0
+"""Offset of the filter's models and process noises, if they are time-invariant."""
+_COUNTER: Final = np.uint64(6)  # the first block of step 0 that neither a step nor a reset uses
 
 
 @inline_scalar
 def nothing_shared() -> Any:
-    """In place of `packing.unpack`: nothing that all rows share."""
+    """Stand in for `packing.unpack` where no settings are shared by all rows."""
     return None, None, None, None, None, None
 
 
@@ -41,7 +41,7 @@ def own_scalars(tile: Array, i: int, shared: Scalars | None) -> Scalars:
 
 @inline_scalar
 def own_sensor(tile: Array, i: int, shared: SensorNoise | None) -> SensorNoise:
-    """The sensor that row i's filter believes in."""
+    """The filter's sensor model of row i."""
     if shared is None:
         return packing.unpack_sensor(tile, field.SETTINGS + i, LANES)
     return shared
@@ -49,7 +49,7 @@ def own_sensor(tile: Array, i: int, shared: SensorNoise | None) -> SensorNoise:
 
 @inline_scalar
 def own_forces(tile: Array, i: int, shared: Forces | None) -> Forces:
-    """What acts on row i in the nonlinear truth."""
+    """Forces on row i in the nonlinear truth."""
     if shared is None:
         return packing.unpack_forces(tile, field.SETTINGS + i, LANES)
     return shared
@@ -57,7 +57,7 @@ def own_forces(tile: Array, i: int, shared: Forces | None) -> Forces:
 
 @inline_scalar
 def _draw(tile: Array, i: int, count: int) -> None:
-    """Row i's variant, by its stream and episode: the same at all steps, of numbers that are used for nothing else."""
+    """Draw row i's variant from its stream and episode: the same at all steps, from numbers used for nothing else."""
     word, _ = random_streams.threefry2x64(
         to_bits(tile[field.KEY + i]),
         to_bits(tile[field.KEY + LANES + i]),
@@ -70,24 +70,24 @@ def _draw(tile: Array, i: int, count: int) -> None:
 
 @tile_function
 def draw(tile: Array, width: Width, count: int) -> None:
-    """Which of `count` variants the rows fly."""
+    """Draw which of `count` variants each row flies."""
     for i in range(len(width)):
         _draw(tile, i, count)
 
 
 @inline_scalar
 def column(k: int) -> int:
-    """Where a column of the schedule stands in the tile."""
+    """Offset of a column of the schedule in the tile."""
     return field.PLAN + k * LANES if k < WIDTH else field.TABLE + (k - WIDTH) * LANES
 
 
 @tile_function
 def read(tile: Array, width: Width, schedule: Array, packed: Array) -> None:
-    """The settings of the rows' variants, and their rows of the schedule.
+    """Load the settings of the rows' variants, and their rows of the schedule.
 
     Args:
         tile: the tile, in which the variants have been drawn.
-        width: as long as the lanes computed.
+        width: see `tile.Width`.
         schedule: tables of all variants (variants, steps, columns).
         packed: packed settings of all variants (variants, SIZE).
     """
@@ -104,3 +104,10 @@ def read(tile: Array, width: Width, schedule: Array, packed: Array) -> None:
     for k in range(columns):
         for i in range(len(width)):
             tile[column(k) + i] = plans[now[i] + k]
+
+
+@tile_function
+def load(tile: Array, width: Width, schedule: Array, packed: Array) -> None:
+    """Draw the rows' variants, and load their settings and rows of the schedule."""
+    draw(tile, width, len(packed))
+    read(tile, width, schedule, packed)

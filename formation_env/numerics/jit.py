@@ -1,13 +1,16 @@
-"""How the compiled functions of the project are made.
+"""Decorators of the project's compiled functions, and their cache on disk.
 
 An inlined scalar function works on one row's scalars. It is inlined where it is called, so that a loop over the rows of
 a tile has a body of scalars only, which the compiler turns into vector instructions.
 """
 
+import warnings
 from collections.abc import Callable
 from typing import Any, Final, TypeVar, cast
 
 import numba
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic, register_jitable
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -42,8 +45,55 @@ def python_and_compiled(function: F) -> F:
 
 
 def compiled_loop(function: F) -> F:
-    """Compile a loop over arrays that Python calls; kept on disk."""
-    return cast(F, numba.njit(**_ARITHMETIC, cache=True)(function))
+    """Compile a loop over arrays that Python calls, and cache it on disk where that is possible."""
+    compiled = numba.njit(**_ARITHMETIC)(function)
+    if isinstance(compiled, Dispatcher):  # not with NUMBA_DISABLE_JIT
+        try:
+            cast(Any, compiled)._cache = _Cache(function)  # type: ignore[no-untyped-call]
+        except RuntimeError as error:  # numba found no folder that it may write to
+            _warn_once(f"{error}; {_NO_CACHE}")
+    return cast(F, compiled)
+
+
+class _Cache(FunctionCache):
+    """numba's cache of a function, which compiles anew where a file is damaged or cannot be written.
+
+    numba itself passes on whatever goes wrong, at every later run too.
+    """
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compiled code for a signature, or None if there is none that can be used."""
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except Exception as error:  # unpickling a damaged file may raise anything
+            _warn_once(f"damaged cache {self.cache_path}: {type(error).__name__}: {error}; the code is compiled anew")
+            self._write(self.flush)
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Save compiled code for a signature, if the disk takes it."""
+        self._write(lambda: FunctionCache.save_overload(self, sig, data))  # type: ignore[no-untyped-call]
+
+    def _write(self, save: Callable[[], Any]) -> None:
+        try:
+            save()
+        except OSError as error:
+            _warn_once(f"cache {self.cache_path}: {error}; {_NO_CACHE}")
+
+
+_NO_CACHE: Final = (
+    "compiled code is not cached, and each process compiles for up to a minute: "
+    "set NUMBA_CACHE_DIR to a folder that can be written"
+)
+_warned: set[str] = set()
+
+
+def _warn_once(text: str) -> None:
+    """Warn of a fault of the cache, once for all functions that it concerns."""
+    kind = text.rpartition(";")[2]
+    if kind not in _warned:
+        _warned.add(kind)
+        warnings.warn(f"formation_env: {text}", RuntimeWarning, stacklevel=3)
 
 
 def _spaced(typing_context: Any, values: Any, first: Any, step: Any, count: Any) -> Any:

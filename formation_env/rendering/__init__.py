@@ -1,1 +1,1 @@
-"""Pictures of a flight. Only `renderer` and what it imports need matplotlib; they are imported when first used."""
+"""Frames of a flight. Only `renderer` and its imports need matplotlib; they are imported at the first frame."""

@@ -1,4 +1,4 @@
-"""What the environments tell Gymnasium about rendering; without matplotlib."""
+"""Rendering modes and frame rate, as in the environments' metadata; needs no matplotlib."""
 
 from typing import Final
 

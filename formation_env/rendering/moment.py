@@ -1,26 +1,28 @@
-"""What a frame shows: the state of the flight, and the plan behind it."""
+"""The content of a frame: the state of the flight, its trail, and the plan."""
 
+from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from formation_env.kernel import tile as field
 from formation_env.kernel.simulation import Simulation
 from formation_env.numerics.arrays import Array
-from formation_env.numerics.jit import LANES
 from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import Leg, leg_reference, legs
 
 MARGIN: Final = 1.16
 """Half the width of the view of a plan, in half widths of the plan."""
 POINTS_PER_PERIOD: Final = 180
-"""Of a drawn reference path."""
+"""Points of a drawn reference path per orbit."""
+TRAIL_PERIODS: Final = 0.5
+"""Length of the trail, in orbits."""
 
 
 @dataclass(frozen=True)
 class Moment:
-    """What a frame shows.
+    """The state of a flight, as a frame shows it.
 
     Attributes:
         step: steps since the start.
@@ -46,21 +48,46 @@ class Moment:
 
 
 def read_moment(simulation: Simulation) -> Moment:
-    """What the simulation's first row shows now."""
-    in_plane, z_variance = simulation.row_state(field.P_IN_PLANE, 10), simulation.row_state(field.P_CROSS_TRACK, 1)[0]
-    xx, xy, yy = in_plane[[0, 1, 4]]
-    first = (field.THRUST - field.RESULTS) // LANES
+    """The present moment of the simulation's first row."""
+    results, state = simulation.first_row_results(), simulation.first_row_state
+    xx, xy, yy = state("covariance_in_plane")[[0, 1, 4]]
+    zz = state("covariance_cross_track")[0]
+    thrust = np.array([results["thrust_x"], results["thrust_y"], results["thrust_z"]])
     return Moment(
-        step=int(simulation.row_state(field.STEP, 1)[0]),
-        truth=simulation.row_state(field.TRUTH, 3),
-        estimate=simulation.row_state(field.ESTIMATE, 3),
-        covariance=np.array([[xx, xy, 0], [xy, yy, 0], [0, 0, z_variance]]),
-        thrust=simulation.results[first : first + 3, 0] / simulation.flown.spacecraft.max_accel_m_s2,
-        measured=bool(simulation.result(field.MEASURED)[0] > 0.5),
-        age_s=float(simulation.row_state(field.AGE, 1)[0]),
-        position_error_m=float(simulation.result(field.POSITION_ERROR)[0]),
-        delta_v_m_s=float(simulation.row_state(field.SUM_DELTA_V, 1)[0]),
+        step=int(state("step")[0]),
+        truth=state("true_state")[:3],
+        estimate=state("estimate")[:3],
+        covariance=np.array([[xx, xy, 0], [xy, yy, 0], [0, 0, zz]]),
+        thrust=thrust / simulation.first_row_scenario.spacecraft.max_accel_m_s2,
+        measured=results["measured"] > 0.5,
+        age_s=float(state("measurement_age")[0]),
+        position_error_m=results["position_error"],
+        delta_v_m_s=float(state("sum_delta_v")[0]),
     )
+
+
+class Trail:
+    """The follower's positions at the last instants, whether or not they were drawn."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._points: deque[tuple[Array, bool]] = deque(maxlen=max(2, scenario.steps(TRAIL_PERIODS)))
+
+    def record(self, simulation: Simulation) -> None:
+        """Add the present position of the simulation's first row."""
+        lost = simulation.first_row_results()["measured"] < 0.5
+        self._points.append((simulation.first_row_state("true_state")[:3], lost))
+
+    def clear(self) -> None:
+        """Begin a new episode's trail."""
+        self._points.clear()
+
+    def positions(self) -> Array:
+        """Positions (points, 3), m."""
+        return np.array([position for position, _ in self._points])
+
+    def lost(self) -> NDArray[np.bool_]:
+        """Whether the measurement was lost at each of them (points,)."""
+        return np.array([lost for _, lost in self._points])
 
 
 class Plan:
@@ -91,7 +118,7 @@ class Plan:
         return leg_reference(self._scenario, leg, steps)[:, :3]
 
     def leg(self, step: int) -> Leg:
-        """The leg that the step to this instant is judged by."""
+        """The leg that scores the step to this instant."""
         return next(leg for leg in self.legs if step <= leg.end)
 
     def reference(self, step: int) -> Array:

@@ -1,6 +1,5 @@
 """Frames of an environment, one after another, as images or in a window."""
 
-from collections import deque
 from typing import Any, Final, cast
 
 import matplotlib
@@ -9,25 +8,24 @@ from matplotlib.backends.registry import BackendFilter, backend_registry
 
 from formation_env.kernel.simulation import Simulation
 from formation_env.rendering.modes import FRAMES_PER_S, RENDER_MODES
-from formation_env.rendering.moment import Moment, read_moment
+from formation_env.rendering.moment import Trail, read_moment
 from formation_env.rendering.scene import DPI, HEIGHT_PX, WIDTH_PX, Frame, Scene
 from formation_env.task.scenario import Scenario
 
-TRAIL_PERIODS: Final = 0.5
 PAUSE_S: Final = 1 / FRAMES_PER_S
 
 
 class Renderer:
     """Draws a flight.
 
-    A copy or a pickle keeps the trail; it makes a picture and a window of its own when it draws.
+    A copy or a pickle makes a picture and a window of its own when it draws.
     """
 
     def __init__(self, scenario: Scenario, render_mode: str) -> None:
         """Prepare; the first `draw` does the work.
 
         Args:
-            scenario: what is flown.
+            scenario: the scenario.
             render_mode: `rgb_array` or `human`.
 
         Raises:
@@ -35,14 +33,13 @@ class Renderer:
         """
         if render_mode not in RENDER_MODES:
             raise ValueError(f"render_mode: must be one of {list(RENDER_MODES)}, got {render_mode!r}")
-        self._flown = scenario
+        self._scenario = scenario
         self._mode = render_mode
-        self._trail: deque[Moment] = deque(maxlen=max(2, scenario.steps(TRAIL_PERIODS)))
         self._scene: Scene | None = None
         self._window: Window | None = None
 
-    def draw(self, simulation: Simulation) -> Frame | None:
-        """Draw the first row of a simulation.
+    def draw(self, simulation: Simulation, trail: Trail) -> Frame | None:
+        """Draw the first row of a simulation, and its trail.
 
         Returns:
             Image (height, width, 3) in mode `rgb_array`, None in mode `human`.
@@ -52,22 +49,17 @@ class Renderer:
         """
         if self._mode == "human" and self._window is None:
             self._window = Window()
-        moment = read_moment(simulation)
-        if not self._trail or self._trail[-1].step != moment.step:
-            self._trail.append(moment)
-        if self._scene is None or simulation.flown is not self._flown:
-            self._flown = simulation.flown
-            self._scene = Scene(self._flown)
-        trail = np.array([past.truth for past in self._trail])
-        frame = self._scene.draw(moment, trail, np.array([not past.measured for past in self._trail]))
+        if self._scene is None or simulation.first_row_scenario is not self._scenario:
+            self._scenario = simulation.first_row_scenario
+            self._scene = Scene(self._scenario)
+        frame = self._scene.draw(read_moment(simulation), trail.positions(), trail.lost())
         if self._window is None:
             return frame
         self._window.show(frame)
         return None
 
     def restart(self) -> None:
-        """A new episode has begun."""
-        self._trail.clear()
+        """Show the whole plan again, for a new episode."""
         if self._scene is not None:
             self._scene.restart()
 
@@ -82,19 +74,21 @@ class Renderer:
 
 
 class Window:
-    """Shows images with pyplot; one that the user has closed stays closed."""
+    """A pyplot window of images; once the user has closed it, it stays closed."""
 
     def __init__(self) -> None:
         """Open it.
 
         Raises:
-            RuntimeError: there is no display, or matplotlib has no backend for it.
+            RuntimeError: there is no display, or matplotlib's backend has no windows.
         """
         from matplotlib import pyplot
 
         backend, registry = matplotlib.get_backend(), cast(Any, backend_registry)
         if backend.lower() in registry.list_builtin(BackendFilter.NON_INTERACTIVE):
             raise _no_window(f"matplotlib backend {backend!r} has none")
+        if "inline" in backend.lower():  # it shows a figure once and closes it, so that later frames would be lost
+            raise _no_window(f"matplotlib backend {backend!r} of the notebook shows still pictures only")
         try:
             self._figure = pyplot.figure(figsize=(WIDTH_PX / DPI, HEIGHT_PX / DPI), dpi=DPI)
         except ImportError as error:

@@ -1,4 +1,4 @@
-"""The whole picture: two views of the formation, two close-ups of the follower, and what there is to say about them."""
+"""The whole picture: two views of the formation, two close-ups of the follower, and the numbers above them."""
 
 from typing import Any, Final
 
@@ -151,20 +151,20 @@ class Scene:
             self._draw_background(moment.step)
 
     def _values(self, moment: Moment) -> list[str]:
-        """Texts of `_NUMBERS`."""
+        """Texts of `_NUMBERS`, in their order."""
         dt_s, period_s = self._scenario.dt_s, self._scenario.orbit.period_s
         leg = self._plan.leg(moment.step)
         goal = leg.arrival if moment.step < leg.arrival else leg.end
-        sigma_m = np.sqrt(np.trace(moment.covariance) / 3)
-        accel_mm_s2 = 1000 * self._scenario.spacecraft.max_accel_m_s2 * np.linalg.norm(moment.thrust)
+        sigma_m = float(np.sqrt(np.trace(moment.covariance) / 3))
+        accel_mm_s2 = 1000 * self._scenario.spacecraft.max_accel_m_s2 * float(np.linalg.norm(moment.thrust))
         return [
             f"{moment.step * dt_s:.0f} s",
             f"{moment.step * dt_s / period_s:.2f}",
             f"{(goal - moment.step) * dt_s:.0f} s",
-            f"{moment.position_error_m:.1f} m",
-            f"{sigma_m:.1f} m",
-            f"{accel_mm_s2:.2f} mm/s²",
-            f"{moment.delta_v_m_s:.3f} m/s",
+            f"{_readable(moment.position_error_m, 1)} m",
+            f"{_readable(sigma_m, 1)} m",
+            f"{_readable(accel_mm_s2, 2)} mm/s²",
+            f"{_readable(moment.delta_v_m_s, 3)} m/s",
         ]
 
     def _show_link(self, moment: Moment) -> None:
@@ -173,6 +173,11 @@ class Scene:
         text = "LINK UP" if moment.measured else f"LINK LOST  {moment.age_s:.0f} s"
         fill, edge, color = ("white", GREY, GREY) if moment.measured else (RED, RED, "white")
         self._link.set(text=text, color=color, bbox={"fc": fill, "ec": edge, "boxstyle": "round,pad=0.4"})
+
+
+def _readable(value: float, decimals: int) -> str:
+    """A number with some decimals, or two significant digits where these would show fewer."""
+    return f"{value:.{decimals}f}" if value == 0 or abs(value) >= 10.0 ** (1 - decimals) else f"{value:.2g}"
 
 
 def _stage(leg: Leg, step: int) -> tuple[int, bool]:

@@ -3,7 +3,7 @@
 import math
 from dataclasses import fields, replace
 from functools import lru_cache
-from typing import Literal, Self
+from typing import Self
 
 import numpy as np
 from pydantic import model_validator
@@ -19,6 +19,7 @@ from formation_env.navigation.sensor import Sensor
 from formation_env.orbital.orbit import Orbit
 from formation_env.settings import NonNegative, Positive, Text, nearest, settings
 from formation_env.task.randomization import DomainRandomization
+from formation_env.task.reward import Reward
 
 
 @settings(renamed={"spread_pos_m": "initial_sigma_pos_m", "spread_vel_m_s": "initial_sigma_vel_m_s"})
@@ -51,23 +52,6 @@ class Phase:
     formation: AnyFormation
     transfer_orbits: NonNegative = 0.0
     hold_orbits: Positive
-
-
-@settings(renamed={"shape": "error_cost"})
-class Reward:
-    """r = -(delta-v + error_weight |e| dt / T_hold), an equivalent delta-v in m/s.
-
-    Attributes:
-        error_weight: price of the mean position error of the hold, (m/s) per m.
-        transfer_error_weight: price of errors during transfer, also times dt / T_hold; 0 leaves the way free.
-        error_cost: `linear` in the error, or `quadratic`: |e|^2 / quadratic_scale_m in place of |e|.
-        quadratic_scale_m: error at which both shapes cost the same, m.
-    """
-
-    error_weight: NonNegative = 0.01
-    transfer_error_weight: NonNegative = 0.0
-    error_cost: Literal["linear", "quadratic"] = "linear"
-    quadratic_scale_m: Positive = 100.0
 
 
 @settings

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, DiscreteModel
 from formation_env.numerics.arrays import Array
+from formation_env.task.reward import Scoring, scoring
 from formation_env.task.scenario import Phase, Scenario
 
 FIELDS: Final = {
@@ -21,8 +22,8 @@ FIELDS: Final = {
     "phase": 1,  # index
     "time_left": 1,  # to the end of the phase, in periods
     "link_closed": 1,  # 1 while a dropout window is open
-    "error_weight": 1,  # price of an error over the step to this instant, (m/s) per m
-    "weight_left": 1,  # sum of the later prices
+    "error_weight": 1,  # weight of the error at this instant, (m/s) per m
+    "weight_left": 1,  # sum of the later weights
     "counts": 1,  # 1 if the step to this instant belongs to a hold
     "counts_left": 1,  # later steps that do
     "arrives": 1,  # 1 / number of transfers if one ends at this instant; without any, the start counts
@@ -67,12 +68,20 @@ def leg_reference(scenario: Scenario, leg: Leg, steps: ArrayLike) -> Array:
     return leg.phase.formation.reference(times_s, scenario.orbit, leg.arrival * scenario.dt_s)
 
 
+def score_table(scenario: Scenario) -> Scoring:
+    """How the error at each instant is scored."""
+    plan = legs(scenario)
+    return scoring(scenario.reward, [leg.arrival for leg in plan], [leg.end for leg in plan], scenario.dt_s)
+
+
 def build_schedule(scenario: Scenario) -> Array:
     """The table (num_steps + 1, WIDTH); the columns are `FIELDS`."""
-    table = np.zeros((scenario.num_steps + 1, WIDTH))
+    table, scores = np.zeros((scenario.num_steps + 1, WIDTH)), score_table(scenario)
+    column(table, "error_weight")[:], column(table, "counts")[:] = scores.error_weight, scores.in_hold
     for leg in legs(scenario):
         _fill_plan(table, scenario, leg)
-        _fill_scores(table, scenario, leg)
+        scored = np.flatnonzero(scores.leg == leg.index)
+        columns(table, "scored_position")[scored] = leg_reference(scenario, leg, scored)[:, :3]
     arrivals = [leg.arrival for leg in legs(scenario) if leg.arrival > leg.start] or [0]
     column(table, "arrives")[arrivals] = 1 / len(arrivals)
     times_s: Array = scenario.dt_s * np.arange(len(table), dtype=float)
@@ -136,16 +145,3 @@ def _coasts(model: DiscreteModel) -> tuple[Array, Array]:
         Phi[k + 1] = Phi[k] @ model.Phi[step]
         delta[k + 1] = Phi[k] @ model.delta[step] + delta[k]
     return Phi, delta
-
-
-def _fill_scores(table: Array, scenario: Scenario, leg: Leg) -> None:
-    """How the steps of the leg are judged, each at its end."""
-    ends = np.arange(leg.start + 1, leg.end + 1)
-    judged = slice(leg.start + 1, leg.end + 1)
-    if leg.start == 0:
-        ends, judged = np.arange(leg.end + 1), slice(0, leg.end + 1)
-    held = ends > leg.arrival
-    weight = np.where(held, scenario.reward.error_weight, scenario.reward.transfer_error_weight)
-    columns(table, "scored_position")[judged] = leg_reference(scenario, leg, ends)[:, :3]
-    column(table, "error_weight")[judged] = np.where(ends > 0, weight, 0) * scenario.dt_s / scenario.hold_s
-    column(table, "counts")[judged] = held

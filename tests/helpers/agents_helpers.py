@@ -8,7 +8,8 @@ from typer.testing import CliRunner
 
 from agents.__main__ import MISTAKE, app
 from agents.policy.actor import Actor, Functions
-from agents.training.run_folder import Run
+from agents.training.checkpoint import load_checkpoint
+from agents.training.run_folder import CHECKPOINT, Run, load_run
 from agents.training.run_settings import plan_run
 from formation_env import load_scenario
 from formation_env.task.observation import SIZE
@@ -34,13 +35,18 @@ def small_run(folder: Path, algorithm: str, agent: str = "", **changes: Any) -> 
     Args:
         folder: gets the scenario and the hyperparameters, scenario.yaml and agent.yaml.
         algorithm: ppo or sac.
-        agent: lines of YAML beside those of `SMALL`.
+        agent: further lines of YAML after those of `SMALL`.
         changes: arguments of `plan_run`.
     """
     (folder / "scenario.yaml").write_text(SCENARIO)
     (folder / "agent.yaml").write_text(SMALL[algorithm] + agent)
     given = {"steps": 512, "validations": 2, "validation_episodes": 4, "config": folder / "agent.yaml", "threads": 1}
     return plan_run(algorithm, **({"env": str(folder / "scenario.yaml")} | given | changes))
+
+
+def checkpoint_of(folder: Path) -> dict[str, Any]:
+    """State in the checkpoint of a run's folder."""
+    return load_checkpoint(folder / CHECKPOINT, load_run(folder))
 
 
 def random_actor(squash: str, activation: str = "tanh", power: float = 2.0, width: int = 8) -> Actor:

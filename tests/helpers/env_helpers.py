@@ -11,7 +11,6 @@ from scipy.linalg import expm
 
 from formation_env import FormationEnv, FormationVectorEnv, Scenario, load_scenario
 from formation_env.dropout import Dropout, NoDropout
-from formation_env.kernel import tile
 from formation_env.navigation.sensor import Sensor
 from formation_env.task.scenario import Limits, Start
 
@@ -157,10 +156,10 @@ def plan(scenario: Scenario) -> list[Instant]:
 def covariances(env: FormationVectorEnv) -> Array:
     """The filters' covariances (rows, 6, 6), put together from their two independent parts."""
     P = np.zeros((env.num_envs, 6, 6))
-    for axes, field in (((0, 1, 3, 4), tile.P_IN_PLANE), ((2, 5), tile.P_CROSS_TRACK)):
+    for axes, name in (((0, 1, 3, 4), "covariance_in_plane"), ((2, 5), "covariance_cross_track")):
         upper = np.triu_indices(len(axes))
         block = np.zeros((env.num_envs, len(axes), len(axes)))
-        block[:, upper[0], upper[1]] = env.simulation.state(field, len(upper[0]))
+        block[:, upper[0], upper[1]] = env.simulation.read(name)
         block[:, upper[1], upper[0]] = block[:, upper[0], upper[1]]
         P[np.ix_(range(env.num_envs), axes, axes)] = block
     return P

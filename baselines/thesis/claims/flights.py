@@ -125,7 +125,7 @@ class WithPath(Law):
 
     def make(self, scenario: Scenario) -> AccelerationPolicy:
         """The policy for a scenario."""
-        return make_policy("lqr", scenario, replace(super().make(scenario).gains, feedforward=True))  # type: ignore[attr-defined]
+        return make_policy("lqr", scenario, replace(super().make(scenario).settings, feedforward=True))  # type: ignore[attr-defined]
 
 
 def error_state(control_s2: float | None = None) -> Law:

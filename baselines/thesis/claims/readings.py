@@ -40,7 +40,7 @@ class Weighted(Law):
         """The policy for a scenario."""
         n = scenario.orbit.mean_motion_rad_s
         control_s2 = tuple(A_S2 * n**4 if axis in self.axes else A_S2 for axis in range(3))
-        gains = super().make(scenario).gains  # type: ignore[attr-defined]
+        gains = super().make(scenario).settings  # type: ignore[attr-defined]
         return make_policy("lqr", scenario, replace(gains, hold=replace(gains.hold, control_s2=control_s2)))
 
 
@@ -50,7 +50,7 @@ class Integrated(Law):
 
     def make(self, scenario: Scenario) -> AccelerationPolicy:
         """The policy for a scenario."""
-        gains = super().make(scenario).gains  # type: ignore[attr-defined]
+        gains = super().make(scenario).settings  # type: ignore[attr-defined]
         return make_policy("lqr_quasi_static", scenario, replace(gains, feedforward="integrated"))
 
 

@@ -20,7 +20,7 @@ def link(tile: Array, i: int, settings: Scalars) -> None:
 
 @inline_scalar
 def dropout(tile: Array, i: int, settings: Scalars) -> None:
-    """Whether this instant's measurement arrives, and the age of the last that did."""
+    """Receive this instant's measurement or lose it, and update the age of the last one received."""
     measured = tile[field.LINK_UP + i] * (1.0 - tile[LINK_CLOSED + i])
     tile[field.MEASURED + i] = measured
     tile[field.AGE + i] = 0.0 if measured > 0.5 else tile[field.AGE + i] + settings.dt_s

@@ -1,4 +1,4 @@
-"""Between the rows' memory and a tile: states in, states and results out, and the row of the schedule."""
+"""Copies between the rows' memory and a tile: states in, states and results out, and the row of the schedule."""
 
 from typing import Final
 
@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_env.kernel import tile as field
+from formation_env.kernel.stages.noise import NUM_NORMALS
 from formation_env.kernel.tile import Width
 from formation_env.kernel.variants import column
 from formation_env.numerics.arrays import Array
@@ -17,7 +18,7 @@ STATE_SIZE: Final = field.STATE_FIELDS * LANES
 
 @tile_function
 def load(tile: Array, width: Width, states: Array, index: int, actions: NDArray[np.float32], used: int) -> None:
-    """A tile's states and actions into scratch space, on the way to the next instant."""
+    """Load a tile's states and actions, and advance its step counters."""
     for k in range(STATE_SIZE):
         tile[k] = states[index, k]
     for i in range(used):
@@ -37,7 +38,7 @@ def store(
     results: Array,
     used: int,
 ) -> None:
-    """A tile's states, observations and results out of scratch space."""
+    """Store a tile's states, observations and results."""
     first = index * LANES
     for k in range(STATE_SIZE):
         states[index, k] = tile[k]
@@ -50,8 +51,23 @@ def store(
 
 
 @tile_function
+def load_streams(tile: Array, width: Width, states: Array, index: int) -> None:
+    """Load what the random numbers of a tile's last step come from: key, episode and step."""
+    for k in range(field.TRUTH):
+        tile[k] = states[index, k]
+
+
+@tile_function
+def store_normals(tile: Array, width: Width, normals: Array, index: int) -> None:
+    """Store the standard normals of a tile's rows."""
+    for k in range(NUM_NORMALS):
+        for i in range(len(width)):
+            normals[k, index * LANES + i] = tile[field.NORMAL + k * LANES + i]
+
+
+@tile_function
 def gather(tile: Array, width: Width, states: Array, rows: NDArray[np.intp], first: int) -> None:
-    """Rows from `first` on side by side into scratch space, on the way to the start of their next episode."""
+    """Load the rows from `first` on side by side, and advance their episode counters."""
     for i in range(len(width)):
         source = min(first + i, len(rows) - 1)  # idle lanes repeat the last row
         index, lane = rows[source] // LANES, rows[source] % LANES
@@ -71,7 +87,7 @@ def scatter(
     observations: NDArray[np.float32],
     results: Array,
 ) -> None:
-    """The way back of `gather`, with observations and results."""
+    """Store the rows that `gather` loaded, with their observations and results."""
     for i in range(min(len(width), len(rows) - first)):
         row = rows[first + i]
         for k in range(field.STATE_FIELDS):
@@ -84,17 +100,17 @@ def scatter(
 
 @tile_function
 def read_plan(tile: Array, width: Width, used: int, schedule: Array, known_step: int) -> int:
-    """The schedule's rows. Mostly all rows are at one step, which the scratch space may hold already.
+    """Load the schedule's row of each row's step; usually all are at one step, which the tile may hold already.
 
     Args:
         tile: the tile.
-        width: as long as the lanes computed.
-        used: how many of them are rows; the others do not matter.
+        width: see `tile.Width`.
+        used: number of rows in the tile; the values of the idle ones do not matter.
         schedule: the table (steps, columns).
         known_step: the step whose row the whole tile holds, or -1.
 
     Returns:
-        The same, after this call.
+        `known_step` after this call.
     """
     last = len(schedule) - 1
     first = min(int(tile[field.STEP]), last)

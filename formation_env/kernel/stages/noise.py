@@ -11,16 +11,16 @@ from formation_env.numerics.arrays import Array
 from formation_env.numerics.fastmath import to_bits, to_integer
 from formation_env.numerics.jit import LANES, inline_scalar, tile_function
 
+NUM_NORMALS: Final = 10
+"""Standard normals drawn at an instant."""
+PROCESS_NORMALS: Final = slice(0, 3)
+SENSOR_NORMALS: Final = slice(3, 9)
+THRUST_NORMAL: Final = 9
+"""Which of them disturb the acceleration, the measurement and the thrust's magnitude."""
 FIRST_PROCESS_NOISE: Final = field.NORMAL
-
-
 FIRST_SENSOR_NOISE: Final = field.NORMAL + 3 * LANES
-
-
-THRUST_NOISE: Final = field.NORMAL + 9 * LANES
-
-
-LINK_UNIFORM: Final = field.UNIFORM + 10 * LANES
+THRUST_NOISE: Final = field.NORMAL + THRUST_NORMAL * LANES
+LINK_UNIFORM: Final = field.UNIFORM + NUM_NORMALS * LANES
 
 
 @inline_scalar
@@ -44,7 +44,7 @@ def draw_normals(tile: Array, i: int, pair: int) -> None:
 
 @tile_function
 def draw(tile: Array, width: Width, first_block: int) -> None:
-    """Random numbers of an instant."""
+    """Draw the random numbers of an instant from the rows' streams."""
     for block in range(3):
         for i in range(len(width)):
             draw_uniforms(tile, i, block, first_block)

@@ -15,7 +15,7 @@ from formation_env.numerics.fastmath import log
 from formation_env.numerics.jit import LANES, inline_scalar, tile_function
 from formation_env.task import observation
 
-# Offsets of the schedule's columns and of the observation's blocks, as the compiler needs them: constants.
+# Offsets of the schedule's columns and of the observation's blocks: constants to the compiler.
 REFERENCE: Final = field.plan("reference")
 COAST_IN_PLANE: Final = field.plan("coast_in_plane")
 COAST_CROSS_TRACK: Final = field.plan("coast_cross_track")
@@ -80,7 +80,7 @@ def observe_error(tile: Array, i: int, axis: int, settings: Scalars) -> None:
 
 @inline_scalar
 def observe_miss(tile: Array, i: int, settings: Scalars) -> None:
-    """The error that coasting leads to."""
+    """Zero-effort miss: the error at the arrival if the follower coasts."""
     e, m, d = field.ESTIMATE + i, COAST_IN_PLANE + i, COAST_OFFSET + i
     x, y, u, v = tile[e], tile[e + LANES], tile[e + 3 * LANES], tile[e + 4 * LANES]
     z, w = tile[e + 2 * LANES], tile[e + 5 * LANES]
@@ -127,7 +127,7 @@ def observe_rest(tile: Array, i: int, settings: Scalars) -> None:
 
 @tile_function
 def observe(tile: Array, width: Width, settings: packing.Scalars | None) -> None:
-    """The observation."""
+    """Compute the observation of each row."""
     for axis in range(6):
         for i in range(len(width)):
             observe_error(tile, i, axis, own_scalars(tile, i, settings))

@@ -13,32 +13,18 @@ from formation_env.numerics.arrays import Array
 from formation_env.numerics.jit import LANES, inline_scalar, tile_function
 
 SCORED_POSITION: Final = field.plan("scored_position")
-
-
 ERROR_WEIGHT: Final = field.plan("error_weight")
-
-
 WEIGHT_LEFT: Final = field.plan("weight_left")
-
-
 COUNTS: Final = field.plan("counts")
-
-
 COUNTS_LEFT: Final = field.plan("counts_left")
-
-
 ARRIVES: Final = field.plan("arrives")
-
-
 ARRIVES_LEFT: Final = field.plan("arrives_left")
-
-
 PHASE: Final = field.plan("phase")
 
 
 @inline_scalar
 def reward_and_end(tile: Array, i: int, settings: Scalars) -> None:
-    """Reward of the step and whether the episode ends (see `scenario.Reward` and `scenario.Limits`)."""
+    """Reward of the step, and whether the episode ends (see `scenario.Reward` and `scenario.Limits`)."""
     x, y, z = tile[field.TRUTH + i], tile[field.TRUTH + LANES + i], tile[field.TRUTH + 2 * LANES + i]
     dx, dy, dz = (
         x - tile[SCORED_POSITION + i],
@@ -48,7 +34,7 @@ def reward_and_end(tile: Array, i: int, settings: Scalars) -> None:
     error = np.sqrt(dx * dx + dy * dy + dz * dz)
     outside = (error > settings.max_distance) | (x * x + y * y + z * z < settings.keep_out * settings.keep_out)
     ends = outside & (tile[field.STEP + i] > 0.0)
-    # An early end costs as much as staying at the limit until the end, so that leaving never pays.
+    # The penalty equals staying at the limit to the end, so leaving early never pays off.
     stay = max(error, settings.max_distance)
     stay_cost = tile[WEIGHT_LEFT + i] * (settings.linear_cost * stay + settings.quadratic_cost * stay * stay)
     exit_cost = stay_cost if ends else 0.0
@@ -64,7 +50,7 @@ def reward_and_end(tile: Array, i: int, settings: Scalars) -> None:
 
 @inline_scalar
 def totals(tile: Array, i: int, settings: Scalars) -> None:
-    """Sums of the episode; after an early end, what is left of it counts as flown at the limit."""
+    """Add the step to the episode's totals; an early end counts the instants left as flown at the distance limit."""
     error, counts = tile[field.POSITION_ERROR + i], tile[COUNTS + i]
     gone = 1.0 if tile[field.TERMINATED + i] > 0.5 else 0.0
     missed = gone * tile[COUNTS_LEFT + i]
@@ -81,8 +67,8 @@ def totals(tile: Array, i: int, settings: Scalars) -> None:
 
 
 @tile_function
-def judge(tile: Array, width: Width, settings: packing.Scalars | None) -> None:
-    """Reward, end and totals."""
+def score(tile: Array, width: Width, settings: packing.Scalars | None) -> None:
+    """Reward, end of the episode and totals."""
     for i in range(len(width)):
         reward_and_end(tile, i, own_scalars(tile, i, settings))
     for i in range(len(width)):

@@ -12,10 +12,10 @@ from formation_env.numerics.jit import LANES, inline_scalar, tile_function
 
 @inline_scalar
 def begin_row(tile: Array, i: int, given: bool, settings: Scalars) -> None:
-    """Start row i's next episode about the start that TRUTH holds.
+    """Start row i's next episode at the state that TRUTH holds, plus a random deviation.
 
-    The truth lies about the nominal start, which the filter takes for its first estimate; if the start was given, the
-    truth is just there and the estimate lies about it. Either way the first error has the spread's covariance.
+    The truth deviates from the nominal start, which is the filter's first estimate; if the start was given, the truth
+    is exactly there and the estimate deviates. Either way the initial error has the sigmas of `scenario.Start`.
     """
     for k in range(6):
         spread = (settings.spread_pos if k < 3 else settings.spread_vel) * tile[field.NORMAL + k * LANES + i]
@@ -47,7 +47,7 @@ def begin_row(tile: Array, i: int, given: bool, settings: Scalars) -> None:
 
 @tile_function
 def place(tile: Array, width: Width, starts: Array, given: bool, first: int) -> None:
-    """Where the rows start: each where it is told to, if that is given, else where its variant does."""
+    """Put the rows at their given starts, or at the nominal starts of their variants."""
     for i in range(len(width)):
         source = min(first + i, len(starts) - 1) if given else int(tile[field.VARIANT + i])
         for k in range(6):
@@ -56,6 +56,6 @@ def place(tile: Array, width: Width, starts: Array, given: bool, first: int) -> 
 
 @tile_function
 def begin(tile: Array, width: Width, given: bool, settings: packing.Scalars | None) -> None:
-    """The start of an episode."""
+    """Start an episode in each row."""
     for i in range(len(width)):
         begin_row(tile, i, given, own_scalars(tile, i, settings))

@@ -1,4 +1,4 @@
-"""From the action to the acceleration that acts."""
+"""The thruster: from the action to the acceleration that acts."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from formation_env.numerics.jit import LANES, inline_scalar, tile_function
 
 @inline_scalar
 def thruster(tile: Array, i: int, settings: Scalars) -> None:
-    """Action to acceleration: cut to the limit, nothing below the minimum, a random error of the magnitude."""
+    """Action to acceleration: clipped to the limit, zero below the minimum, with a random relative error."""
     x = settings.max_accel * min(max(tile[field.ACTION + i], -1.0), 1.0)
     y = settings.max_accel * min(max(tile[field.ACTION + LANES + i], -1.0), 1.0)
     z = settings.max_accel * min(max(tile[field.ACTION + 2 * LANES + i], -1.0), 1.0)

@@ -1,4 +1,4 @@
-"""Critics that know where a thrust leads, and an actor that stays near the one it began with."""
+"""Critics of after-states, exploration impulses, and the regulariser towards the pretrained actor."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -7,14 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from agents_helpers import random_actor, small_run
+from agents_helpers import checkpoint_of, random_actor, small_run
 
-from agents.algorithms.afterstate_critic import UNIT_POS_M, UNIT_VEL_M_S, Foresight
+from agents.algorithms.afterstate_critic import UNIT_POS_M, UNIT_VEL_M_S, AfterStateFeatures
 from agents.algorithms.models import make_env, make_model
-from agents.algorithms.sac import CriticFirstSAC
+from agents.algorithms.sac_learner import CriticFirstSAC
 from agents.policy.actor import to_bytes
-from agents.training.checkpoint import load_checkpoint
-from agents.training.run_folder import CHECKPOINT, Run
+from agents.training.run_folder import Run
 from agents.training.train import resume, train
 from agents.training.validation import Validation
 from agents.training.warm_start import start_from
@@ -27,19 +26,19 @@ POSITIONS, VELOCITIES = [0, 1, 2, 6, 7, 8], [3, 4, 5, 9, 10, 11]
 
 
 @pytest.mark.parametrize("name", ["initialization", "mission"])
-def test_foresight_is_what_the_filter_predicts(name: str) -> None:
+def test_after_state_is_what_the_filter_predicts(name: str) -> None:
     """Without measurements the environment's next observation is the prediction, changes of phase among it.
 
     Observations are float32 in units of kilometres and more, so positions are known to a millimetre; over the coast to
     the arrival, half an orbit, an error of velocity of 1e-6 m/s grows to some more.
     """
     scenario = replace(load_scenario(name), dropout=Bernoulli(loss_probability=1.0))
-    env, foresight = FormationVectorEnv(8, scenario), Foresight(scenario)
+    env, after_state = FormationVectorEnv(8, scenario), AfterStateFeatures(scenario)
     layout, rng = observation_layout(scenario), np.random.default_rng(0)
     observations, _ = env.reset(seed=list(range(8)))
     for step in range(scenario.num_steps - 1):
         thrusts = rng.normal(0, 0.01, (8, 3)).astype(np.float32)
-        expected = foresight.errors(torch.from_numpy(observations), torch.from_numpy(thrusts)).numpy()
+        expected = after_state.errors(torch.from_numpy(observations), torch.from_numpy(thrusts)).numpy()
         observations = env.step(thrusts)[0]
         got = np.hstack([layout.state(observations, block) for block in ("error", "zero_effort_miss")])
         for axes, unit, within in ((POSITIONS, UNIT_POS_M, 0.05), (VELOCITIES, UNIT_VEL_M_S, 5e-5)):
@@ -75,37 +74,39 @@ def test_what_a_thrust_costs_at_once_is_not_learnt(tmp_path: Path) -> None:
         torch.testing.assert_close(values.squeeze(1), -10 * delta_v_m_s, rtol=1e-4, atol=1e-5)
 
 
-def test_the_anchor_pulls_back(tmp_path: Path) -> None:
+def test_the_behaviour_regularizer_pulls_back(tmp_path: Path) -> None:
     """At the start the price of distance is nought; beyond it is weight times the squared way of the throttles."""
-    model, run = started(tmp_path, "anchor_weight: 7.0\n")
+    model, run = started(tmp_path, "behaviour_regularizer_weight: 7.0\n")
     observations = some_observations(run)
     mean = model.actor.get_action_dist_params(observations)[0].detach()
-    torch.testing.assert_close(model._distance(mean, observations), torch.zeros(8))
+    torch.testing.assert_close(model._behaviour_penalty(mean, observations), torch.zeros(8))
     moved = (mean.tanh() + torch.tensor([0.1, 0.0, -0.2])).clamp(-0.99, 0.99)
     expected = 7 * ((moved - mean.tanh()) ** 2).sum(dim=1)
-    torch.testing.assert_close(model._distance(moved.atanh(), observations), expected, rtol=1e-3, atol=1e-6)
+    torch.testing.assert_close(model._behaviour_penalty(moved.atanh(), observations), expected, rtol=1e-3, atol=1e-6)
 
 
-def test_a_heavy_anchor_holds_the_actor(tmp_path: Path) -> None:
-    """The same updates move the throttles much less, and the anchor itself is not learnt."""
+def test_a_strong_regularizer_holds_the_actor(tmp_path: Path) -> None:
+    """The same updates move the throttles much less, and the pretrained reference is not learnt."""
     moved = {}
     for weight in (0.0, 1e4):
         folder = tmp_path / str(weight)
         folder.mkdir()
-        model, run = started(folder, f"anchor_weight: {weight}\nafter_state: true\n")
+        model, run = started(folder, f"behaviour_regularizer_weight: {weight}\nafter_state: true\n")
         observations = some_observations(run)
         before = model.actor(observations, deterministic=True).detach()
         model.learn(400)
         moved[weight] = (model.actor(observations, deterministic=True) - before).abs().mean().item()
         assert torch.equal(
-            model.anchor(model.actor.extract_features(observations, model.actor.features_extractor)).tanh(), before
+            model.behaviour(model.actor.extract_features(observations, model.actor.features_extractor)).tanh(), before
         )
     assert 0 < moved[1e4] < moved[0.0] / 3
 
 
-def test_an_anchored_run_goes_on_as_if_it_had_not_stopped(tmp_path: Path) -> None:
-    """After an end in the middle the anchor is the actor of the start again, not that of the checkpoint."""
-    agent = "anchor_weight: 5.0\nafter_state: true\nkicks: {share: 0.5}\nn_steps: 3\n"
+def test_a_regularized_run_resumes_to_the_same_bits(tmp_path: Path) -> None:
+    """After an interruption the reference is the actor of the start again, not that of the checkpoint."""
+    agent = (
+        "behaviour_regularizer_weight: 5.0\nafter_state: true\nexploration_impulses: {probability: 0.5}\nn_steps: 3\n"
+    )
     _, run = started(tmp_path, agent)
     train(run, tmp_path / "whole")
     assert train(run, tmp_path / "stopped", time_limit_s=0.0) == "out of time"
@@ -113,11 +114,9 @@ def test_an_anchored_run_goes_on_as_if_it_had_not_stopped(tmp_path: Path) -> Non
         patch.setattr("agents.training.validation.Validation._on_step", stop_at(300))
         with pytest.raises(KeyError):
             resume(tmp_path / "stopped")
-    assert 0 < load_checkpoint(tmp_path / "stopped" / CHECKPOINT)["counters"]["num_timesteps"] < 300
+    assert 0 < checkpoint_of(tmp_path / "stopped")["counters"]["num_timesteps"] < 300
     assert resume(tmp_path / "stopped") == "finished"
-    one, other = (
-        load_checkpoint(tmp_path / name / CHECKPOINT)["parameters"]["policy"] for name in ("whole", "stopped")
-    )
+    one, other = (checkpoint_of(tmp_path / name)["parameters"]["policy"] for name in ("whole", "stopped"))
     for name, tensor in one.items():
         assert torch.equal(tensor, other[name]), name
 
@@ -134,16 +133,16 @@ def stop_at(step: int) -> Callable[[Validation], bool]:
     return dies
 
 
-def test_kicks_are_seldom_larger_row_by_row_and_remembered(tmp_path: Path) -> None:
-    """Of 8 rows and 2000 draws a fifth is kicked, to 1 % of its binomial scatter times 5; sizes are geometric."""
-    model, _ = started(tmp_path, "kicks: {share: 0.2, low: 0.01, high: 0.1}\n")
+def test_exploration_impulses_are_sparse_graded_and_stored(tmp_path: Path) -> None:
+    """Of 8 rows and 2000 draws a fifth has an impulse, within 5 binomial sigmas; sizes are a geometric series."""
+    model, _ = started(tmp_path, "exploration_impulses: {probability: 0.2, sigma_min: 0.01, sigma_max: 0.1}\n")
     still = np.zeros((8, 3), np.float32)
-    draws = np.stack([model._kicked(still)[0] for _ in range(2000)])
-    kicked = (draws != 0).any(axis=2)
-    assert kicked.mean() == pytest.approx(0.2, abs=5 * np.sqrt(0.2 * 0.8 / kicked.size))
-    deviations = [draws[kicked[:, row], row].std() for row in range(8)]
+    draws = np.stack([model._with_impulses(still)[0] for _ in range(2000)])
+    fires = (draws != 0).any(axis=2)
+    assert fires.mean() == pytest.approx(0.2, abs=5 * np.sqrt(0.2 * 0.8 / fires.size))
+    deviations = [draws[fires[:, row], row].std() for row in range(8)]
     np.testing.assert_allclose(deviations, np.geomspace(0.01, 0.1, 8), rtol=0.15)  # some 1200 numbers each: 2 % scatter
-    flown, remembered = model._kicked(still)
+    flown, remembered = model._with_impulses(still)
     assert flown is remembered
 
 
@@ -151,7 +150,13 @@ def test_kicks_are_seldom_larger_row_by_row_and_remembered(tmp_path: Path) -> No
     ("agent", "fault"),
     [
         ("after_state: true\nnormalise_reward: true\n", "normalise_reward: must be false with after_state"),
-        ("kicks: {low: 0.5, high: 0.1}\n", "kicks.low: must be at most kicks.high = 0.1, got 0.5"),
+        (
+            "exploration_impulses: {sigma_min: 0.5, sigma_max: 0.1}\n",
+            "sigma_min: must be at most sigma_max",
+        ),
+        ("kicks: {}\n", "kicks: now exploration_impulses"),
+        ("anchor_weight: 1\n", "anchor_weight: now behaviour_regularizer_weight"),
+        ("exploration_impulses: {share: 0.1}\n", "exploration_impulses.share: now probability"),
     ],
 )
 def test_what_does_not_go_together_is_refused(agent: str, fault: str, tmp_path: Path) -> None:
@@ -163,9 +168,9 @@ def test_what_does_not_go_together_is_refused(agent: str, fault: str, tmp_path: 
 def test_the_actor_learns_at_a_rate_of_its_own_that_falls_to_nothing(tmp_path: Path) -> None:
     """Half-way from the delay's end to the run's the rate is half of the first; the critics keep theirs."""
     model, _ = started(tmp_path, "actor_learning_rate: 1e-4\nlearning_rate: 2e-3\nlearning_rate_end: 2e-3\n")
-    model._slow_down(0.5)
+    model._set_actor_learning_rate(0.5)
     assert model.actor.optimizer.param_groups[0]["lr"] == pytest.approx(5e-5)
-    model._slow_down(-0.1)
+    model._set_actor_learning_rate(-0.1)
     assert model.actor.optimizer.param_groups[0]["lr"] == 0
     assert model.critic.optimizer.param_groups[0]["lr"] == pytest.approx(2e-3)
 

@@ -12,7 +12,7 @@ from agents.hyperparameters import Network, Pretraining
 from agents.policy.actor import Actor, Functions
 from agents.policy.features import CUT, features
 from agents.pretraining.gradient import SMOOTH_M, SMOOTH_THROTTLE, ModelEpisodes
-from agents.pretraining.imitation import imitate
+from agents.pretraining.imitation import Lesson, imitate
 from agents.pretraining.pretrain import pretrain
 from agents.pretraining.recording import record_disturbances
 from baselines import make_policy
@@ -145,7 +145,7 @@ def test_a_clone_flies_nearly_as_its_teacher() -> None:
     teacher = make_policy("lqr", scenario)
     before = flown_costs(net, functions, scenario).mean()
     rounds = [range(3_100_000 + 64 * i, 3_100_064 + 64 * i) for i in range(4)]
-    imitate(net, 2.0, teacher, scenario, rounds, MAGNIFICATION, np.random.default_rng(0))
+    imitate(net, Lesson(teacher, scenario, 2.0, MAGNIFICATION), rounds, np.random.default_rng(0))
     after = flown_costs(net, functions, scenario).mean()
     lqr = -evaluate(teacher, scenario, SEEDS)["return"].mean()
     assert before > 3 * lqr
@@ -153,20 +153,28 @@ def test_a_clone_flies_nearly_as_its_teacher() -> None:
 
 
 def test_pretraining_keeps_the_best_and_repeats_itself() -> None:
-    """Equal seeds give equal actors; the actor's validation cost is the least of those told."""
-    scenario, told = short("keeping"), list[tuple[str, float]]()
-    how = Pretraining(rounds=1, rows=8, updates=4, episodes=8, batch=4)
+    """Equal seeds give equal actors; the actor's validation cost is the lowest in the log."""
+    scenario, log = short("keeping"), list[tuple[str, float]]()
+    settings = Pretraining(rounds=1, rows=8, updates=4, episodes=8, batch=4)
     functions = Functions("tanh", "tanh", 2.0, MAGNIFICATION)
     first, second = (
-        pretrain(how, Network(hidden=(8,)), functions, scenario, 3, 8, lambda done, cost: told.append((done, cost)))
+        pretrain(
+            settings,
+            Network(hidden=(8,)),
+            functions,
+            scenario,
+            seed=3,
+            validation_episodes=8,
+            progress=lambda stage, cost: log.append((stage, cost)),
+        )
         for _ in range(2)
     )
     for (weight, bias), (other_weight, other_bias) in zip(first.layers, second.layers, strict=True):
         np.testing.assert_array_equal(weight, other_weight)
         np.testing.assert_array_equal(bias, other_bias)
-    assert told[:2] == told[2:]
+    assert log[:2] == log[2:]
     cost = -evaluate(first, scenario, range(1_000_000, 1_000_008))["return"].mean()
-    assert cost == pytest.approx(min(cost for _, cost in told), rel=1e-12)
+    assert cost == pytest.approx(min(cost for _, cost in log), rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -186,7 +194,15 @@ def test_the_gradient_goes_through_all_variants_of_a_scenario() -> None:
     """Episodes that differ in size and thrust limit: the clone comes to cost less, on seeds unseen."""
     differing = DomainRandomization(variants=3, formation_size_factor=(0.5, 1.5), max_accel_factor=(0.5, 2.0))
     scenario, costs = dataclasses.replace(short("keeping"), domain_randomization=differing), list[float]()
-    how = Pretraining(rounds=2, rows=32, updates=60, episodes=96, batch=32, learning_rate=2e-2)
+    settings = Pretraining(rounds=2, rows=32, updates=60, episodes=96, batch=32, learning_rate=2e-2)
     functions = Functions("tanh", "tanh", 2.0, MAGNIFICATION)
-    pretrain(how, Network(hidden=(16,)), functions, scenario, 0, 64, lambda done, cost: costs.append(cost))
+    pretrain(
+        settings,
+        Network(hidden=(16,)),
+        functions,
+        scenario,
+        seed=0,
+        validation_episodes=64,
+        progress=lambda stage, cost: costs.append(cost),
+    )
     assert costs[-1] < 0.9 * costs[0]

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 import formation_env.__main__ as command_line
-from agents.hyperparameters import PPOSettings
+from agents.algorithms.ppo import PPOSettings
 from agents.results.bench import measure
 
 

@@ -142,7 +142,7 @@ def test_fronts_fly_a_learned_policy_as_it_is(policies: Path) -> None:
     learned = Learned("ppo", (policies / f"ppo_initialization{TENSORS}",))
     factory = pickle.loads(pickle.dumps(learned))  # as it gets to another process
     front = points({START: load_scenario("initialization")}, {"ppo": factory}, seeds("test", EPISODES), 0)
-    cheap, dear = (front[f"{START} error_weight {value}"].fly(lambda steps: None) for value in (0.1, 10))
+    cheap, dear = (front[f"{START} error_weight {value}"].run(lambda steps: None) for value in (0.1, 10))
     np.testing.assert_array_equal(cheap["delta_v_m_s"], dear["delta_v_m_s"])
     paid = [table["cost_m_s"] - table["delta_v_m_s"] for table in (cheap, dear)]
     np.testing.assert_allclose(paid[1], 100 * paid[0], rtol=1e-9)  # sums round differently
@@ -184,7 +184,7 @@ def test_what_is_shipped_flies_where_it_was_trained(
     """By default the registered ids, and scenarios that a shipped policy was trained on and that have no id."""
     write_policy(policies, "ppo", "bad_communication")
     flown: list[list[str]] = []
-    monkeypatch.setattr(report, "write_report", lambda _, envs, *rest: flown.append(list(envs)) or tmp_path)
+    monkeypatch.setattr(report, "write_report", lambda _, envs, *rest, **more: flown.append(list(envs)) or tmp_path)
     assert run("report", "--out", tmp_path).exit_code == 0
     assert run("report", "--env", KEEPING, "--out", tmp_path).exit_code == 0
     assert flown == [[*ENV_IDS, "bad_communication"], [KEEPING]]
@@ -222,7 +222,8 @@ def test_a_model_of_ones_own_is_evaluated(kind: type[BaseAlgorithm], tmp_path: P
     expected = summarise(evaluate(Sb3Policy(model, 2.0), START, seeds("test", EPISODES)))
     assert list(printed) == list(expected.index)
     for metric, line in expected.iterrows():
-        np.testing.assert_allclose([float(value) for value in printed[str(metric)][:3]], line, rtol=1e-3, atol=1e-9)
+        means = [float(value) for value in printed[str(metric)][:3]]
+        np.testing.assert_allclose(means, line.iloc[:3], rtol=1e-3, atol=1e-9)
 
 
 def test_a_power_shapes_the_actions_of_a_model(tmp_path: Path) -> None:
@@ -277,6 +278,7 @@ def foreign_model(folder: Path) -> Path:
 def test_faulty_sources_are_one_line(tmp_path: Path) -> None:
     """What is missing, damaged, of another algorithm or of another environment is named."""
     (tmp_path / "damaged.zip").write_text("no model")
+    (tmp_path / "model.onnx").write_text("no tensors")
     with zipfile.ZipFile(tmp_path / "other.zip", "w") as archive:
         archive.writestr("data", json.dumps({"exploration_fraction": 0.1}))
     for source, fault in (

@@ -7,13 +7,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 import torch
-from agents_helpers import assert_refused, random_actor, small_run
+from agents_helpers import assert_refused, checkpoint_of, random_actor, small_run
 from safetensors.torch import load_file
 from typer.testing import CliRunner
 
 from agents.__main__ import INTERRUPTED, MISTAKE, app
 from agents.policy.actor import to_bytes
-from agents.training.checkpoint import load_checkpoint
 from agents.training.run_folder import BEST, CHECKPOINT, CURVE, RUN, start_run
 from agents.training.run_settings import default_folder
 from agents.training.train import resume, train
@@ -27,7 +26,7 @@ class KilledError(Exception):
 
 def results(folder: Path) -> tuple[dict[str, torch.Tensor], pd.DataFrame]:
     """What a run came to: its last network and its best actor, and its curve without the clock."""
-    last = load_checkpoint(folder / CHECKPOINT)["parameters"]["policy"]
+    last = checkpoint_of(folder)["parameters"]["policy"]
     return last | load_file(folder / BEST), pd.read_csv(folder / CURVE).drop(columns="seconds")
 
 
@@ -61,7 +60,7 @@ ALL_OPTIONS = "use_sde: true\nsde_sample_freq: 5\nnormalise_reward: true\nshapin
         ("ppo", ALL_OPTIONS + "bootstrap_end: true\nwarmup_rollouts: 3\n"),
         ("sac", ""),
         ("sac", ALL_OPTIONS + "actor_delay_steps: 200\nactor_every: 3\n"),
-        ("sac", "after_state: true\nn_steps: 4\nkicks: {share: 0.2}\nlearning_rate_end: 1e-4\n"),
+        ("sac", "after_state: true\nn_steps: 4\nexploration_impulses: {probability: 0.2}\nlearning_rate_end: 1e-4\n"),
     ],
 )
 def test_killed_and_resumed_is_uninterrupted(
@@ -76,7 +75,7 @@ def test_killed_and_resumed_is_uninterrupted(
             train(run, tmp_path / "killed")
         with pytest.raises(KilledError):
             resume(tmp_path / "killed")
-    assert load_checkpoint(tmp_path / "killed" / CHECKPOINT)["counters"]["num_timesteps"] < 300
+    assert checkpoint_of(tmp_path / "killed")["counters"]["num_timesteps"] < 300
     assert resume(tmp_path / "killed") == "finished"
     assert_same_results(tmp_path / "whole", tmp_path / "killed")
     assert resume(tmp_path / "killed") == "finished"  # there is nothing left to do
@@ -114,7 +113,7 @@ def test_ctrl_c_saves_and_ends_and_resume_goes_on(tmp_path: Path, monkeypatch: p
         result = CliRunner().invoke(app, [*command, "--out", str(tmp_path / "run")])
     assert result.exit_code == INTERRUPTED
     assert f"interrupted; go on with: python -m agents train --resume {tmp_path / 'run'}" in result.stderr
-    assert load_checkpoint(tmp_path / "run" / CHECKPOINT)["counters"]["num_timesteps"] == 384
+    assert checkpoint_of(tmp_path / "run")["counters"]["num_timesteps"] == 384
     again = CliRunner().invoke(app, [*command, "--out", str(tmp_path / "run")])
     assert again.exit_code == MISTAKE
     assert f"error: {tmp_path / 'run'}: holds a run already" in again.stderr
@@ -130,7 +129,7 @@ def test_a_time_limit_saves_and_stops(tmp_path: Path) -> None:
     """Out of time at the first rollout; what is left is flown when there is time."""
     run = small_run(tmp_path, "ppo")
     assert train(run, tmp_path / "run", time_limit_s=0.0) == "out of time"
-    assert load_checkpoint(tmp_path / "run" / CHECKPOINT)["counters"]["num_timesteps"] == 0
+    assert checkpoint_of(tmp_path / "run")["counters"]["num_timesteps"] == 0
     assert resume(tmp_path / "run") == "finished"
     assert list(pd.read_csv(tmp_path / "run" / CURVE)["steps"]) == [0, 256, 512]
 
@@ -160,7 +159,7 @@ def test_what_cannot_be_resumed_is_one_line(tmp_path: Path) -> None:
     start_run(small_run(tmp_path, "ppo"), tmp_path / "run")
     for content in (b"", b"no checkpoint"):
         (tmp_path / "run" / CHECKPOINT).write_bytes(content)
-        assert_refused(["train", "--resume", str(tmp_path / "run")], f"{CHECKPOINT}: damaged, or no checkpoint")
+        assert_refused(["train", "--resume", str(tmp_path / "run")], f"{CHECKPOINT}: damaged, or not a checkpoint")
 
 
 def test_runs_have_a_folder_and_steps_of_their_own(tmp_path: Path) -> None:
@@ -171,5 +170,5 @@ def test_runs_have_a_folder_and_steps_of_their_own(tmp_path: Path) -> None:
     assert run.versions["git"] == "" or len(run.versions["git"].removesuffix("-dirty")) == 40
     start_run(run, tmp_path / "run")
     assert (tmp_path / "run" / RUN).exists()
-    with pytest.raises(ConfigError, match=r"holds a run already; go on with --resume"):
+    with pytest.raises(ConfigError, match=r"holds a run already; continue it with --out"):
         start_run(run, tmp_path / "run")

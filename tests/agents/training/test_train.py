@@ -9,11 +9,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from agents_helpers import small_run
+from stable_baselines3 import PPO, SAC
 from typer.testing import CliRunner
 
 from agents.__main__ import MISTAKE, app
-from agents.algorithms.models import CLASSES
-from agents.hyperparameters import PPOSettings, SACSettings, load_settings
+from agents.algorithms.ppo import PPOSettings
+from agents.algorithms.registry import load_settings
+from agents.algorithms.sac import SACSettings
 from agents.results.evaluate import Sb3Policy
 from agents.training.run_folder import (
     BEST,
@@ -64,8 +66,8 @@ def test_the_curve_is_of_the_validation_seeds(finished: tuple[Run, Path]) -> Non
     """Flown again on these seeds, actor and SB3's model give the curve's best line, which has six digits."""
     run, folder = finished
     best = pd.read_csv(folder / CURVE)["return"].max()
-    model = CLASSES[run.algorithm].load(folder / MODEL, device="cpu")
-    for policy in (load_best(folder)[1], Sb3Policy(model, run.agent.throttle_power)):
+    model = {"ppo": PPO, "sac": SAC}[run.algorithm].load(folder / MODEL, device="cpu")
+    for policy in (load_best(folder)[1], Sb3Policy(model, 1.0)):
         table = evaluate(policy, run.scenario, seeds("validation", 4))
         assert table["return"].mean() == pytest.approx(best, rel=1e-5)
 

@@ -7,15 +7,13 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
-from agents_helpers import PRETRAINED, assert_refused, random_actor, small_run
+from agents_helpers import PRETRAINED, assert_refused, checkpoint_of, random_actor, small_run
 
 from agents.algorithms.models import make_env, make_model
 from agents.algorithms.to_actor import actor_of
 from agents.policy.actor import Actor, Functions, read_actor, to_bytes
-from agents.training.checkpoint import load_checkpoint
 from agents.training.run_folder import (
     BEST,
-    CHECKPOINT,
     CURVE,
     PRETRAINING,
     START,
@@ -90,7 +88,7 @@ def test_a_run_from_a_start_is_noted_with_it(tmp_path: Path) -> None:
     train(run, tmp_path / "run")
     assert (tmp_path / "run" / START).read_bytes() == path.read_bytes()
     assert load_run(tmp_path / "run").start == str(path)
-    last = load_checkpoint(tmp_path / "run" / CHECKPOINT)["parameters"]["policy"]
+    last = checkpoint_of(tmp_path / "run")["parameters"]["policy"]
     assert not np.array_equal(last["action_net.weight"].numpy(), random_actor("tanh").layers[-1][0])
 
 
@@ -98,7 +96,7 @@ def learnt(run: Run, folder: Path) -> tuple[dict[str, torch.Tensor], dict[str, t
     """A run's network before and after."""
     before = make_model(run.agent, make_env(run.agent, run.scenario), run.seed).policy.state_dict()
     train(run, folder)
-    return before, load_checkpoint(folder / CHECKPOINT)["parameters"]["policy"]
+    return before, checkpoint_of(folder)["parameters"]["policy"]
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The search of hyperparameters: judged on validation seeds, gone on with as if never stopped, the hopeless left."""
+"""Hyperparameter search: validation costs, continuation to the same result, early stopping."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -13,12 +13,13 @@ from optuna.trial import FrozenTrial, TrialState
 from typer.testing import CliRunner
 
 from agents.__main__ import INTERRUPTED, app
-from agents.hyperparameters import ALGORITHMS, Algorithm, load_settings
+from agents.algorithms.registry import ALGORITHMS, load_settings
 from agents.training.run_folder import CURVE, START, Run, read_curve
 from agents.training.train import train
 from agents.tuning import search as searching
-from agents.tuning.knobs import KNOBS, present, turned
-from agents.tuning.search import BEST, FEW, JOURNAL, search, task_name
+from agents.tuning.journal import seal_path
+from agents.tuning.search import BEST, JOURNAL, MIN_TRIALS_BEFORE_PRUNING, search, task_name
+from agents.tuning.search_space import apply, current_values, search_space
 from baselines.tuning.study import open_study
 from formation_env import ENV_IDS
 
@@ -27,7 +28,7 @@ BOTTOM = 1e-4
 """The learning rate at which the bowl has its least value."""
 
 
-def kept(run: Run, folder: Path) -> list[FrozenTrial]:
+def trials_in(run: Run, folder: Path) -> list[FrozenTrial]:
     """The trials in a study's journal."""
     return open_study(task_name(run), folder / JOURNAL).get_trials()
 
@@ -50,13 +51,14 @@ def bowl(run: Run, folder: Path, give_up: Callable[[Any], bool]) -> str:
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_knobs_turn_the_hyperparameters_that_they_name(algorithm: Algorithm) -> None:
-    """Their limits are accepted, the shipped files lie within them, and where they stand changes nothing."""
+def test_the_search_space_names_hyperparameters(algorithm: str) -> None:
+    """Limits are accepted, the shipped files lie within them, and applying the current values changes nothing."""
     for env in ENV_IDS:
         agent = load_settings(algorithm, env)
-        assert turned(algorithm, agent, present(algorithm, agent)) == agent
-        for values in ({knob.name: knob.low for knob in KNOBS[algorithm]}, {k.name: k.high for k in KNOBS[algorithm]}):
-            assert present(algorithm, turned(algorithm, agent, values)) == values
+        assert apply(agent, current_values(agent)) == agent
+        space = search_space(ALGORITHMS[algorithm])
+        for values in ({each.name: each.low for each in space}, {each.name: each.high for each in space}):
+            assert current_values(apply(agent, values)) == values
 
 
 def test_the_cost_is_that_of_the_training(tmp_path: Path) -> None:
@@ -77,18 +79,18 @@ def test_the_cost_is_that_of_the_training(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)
-def test_a_stopped_search_goes_on_as_if_it_had_not_been(algorithm: Algorithm, tmp_path: Path) -> None:
+def test_a_stopped_search_goes_on_as_if_it_had_not_been(algorithm: str, tmp_path: Path) -> None:
     """Number by number what one go finds; a finished study trains nothing."""
     run = small_run(tmp_path, algorithm, steps=128, validations=1)
     found = search(run, 3, tmp_path / "one")
     search(run, 1, tmp_path / "two")
-    assert len(kept(run, tmp_path / "two")) == 1
-    told: list[int] = []
-    assert search(run, 3, tmp_path / "two", lambda now: told.append(now.trials)) == found
-    assert told == [2, 3]
-    assert numbers(kept(run, tmp_path / "one")) == numbers(kept(run, tmp_path / "two"))
-    assert search(run, 3, tmp_path / "two", lambda now: told.append(now.trials)) == found
-    assert told == [2, 3]
+    assert len(trials_in(run, tmp_path / "two")) == 1
+    progress: list[int] = []
+    assert search(run, 3, tmp_path / "two", lambda now: progress.append(now.trials)) == found
+    assert progress == [2, 3]
+    assert numbers(trials_in(run, tmp_path / "one")) == numbers(trials_in(run, tmp_path / "two"))
+    assert search(run, 3, tmp_path / "two", lambda now: progress.append(now.trials)) == found
+    assert progress == [2, 3]
 
 
 def test_hopeless_trials_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -100,17 +102,17 @@ def test_hopeless_trials_are_given_up(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(searching, "train", bowl)
     run = small_run(tmp_path, "ppo")
     found = search(run, 30, tmp_path / "study")
-    trials, given_up = kept(run, tmp_path / "study"), 0
+    trials, given_up = trials_in(run, tmp_path / "study"), 0
     for trial in trials:
         last = max(trial.intermediate_values)
         earlier = [
             other.intermediate_values[last] for other in trials[: trial.number] if last in other.intermediate_values
         ]
-        above = len(earlier) >= FEW and trial.intermediate_values[last] > np.median(earlier)
+        above = len(earlier) >= MIN_TRIALS_BEFORE_PRUNING and trial.intermediate_values[last] > np.median(earlier)
         assert (trial.state == TrialState.PRUNED) == above
         given_up += above
     assert 5 < given_up < 30
-    assert all(trial.state == TrialState.COMPLETE for trial in trials[:FEW])
+    assert all(trial.state == TrialState.COMPLETE for trial in trials[:MIN_TRIALS_BEFORE_PRUNING])
     assert found.cost == min(trial.values[0] for trial in trials if trial.values)
     assert found.cost < 0.05**2
     assert found.first_cost == pytest.approx(np.log10(run.agent.learning_rate / BOTTOM) ** 2, rel=1e-5)
@@ -129,7 +131,7 @@ def test_a_diverging_trial_is_given_up(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr(searching, "train", breaks)
     first = run.agent.learning_rate
     search(run, 3, tmp_path / "study")
-    states = [trial.state for trial in kept(run, tmp_path / "study")]
+    states = [trial.state for trial in trials_in(run, tmp_path / "study")]
     assert states == [TrialState.COMPLETE, TrialState.PRUNED, TrialState.PRUNED]
     first = 0.0
     with pytest.raises(ValueError, match="nan"):
@@ -144,7 +146,7 @@ def test_all_trials_start_from_one_actor(tmp_path: Path) -> None:
     before = path.read_bytes(), path.stat().st_mtime_ns
     search(run, 3, tmp_path / "study")
     assert (path.read_bytes(), path.stat().st_mtime_ns) == before
-    assert len({trial.intermediate_values[0] for trial in kept(run, tmp_path / "study")}) == 1
+    assert len({trial.intermediate_values[0] for trial in trials_in(run, tmp_path / "study")}) == 1
     given = small_run(tmp_path, "ppo", PRETRAINED, steps=128, validations=1, start=path)
     others = [given, small_run(tmp_path, "ppo", PRETRAINED, steps=128), small_run(tmp_path, "ppo", steps=128)]
     assert len({task_name(each) for each in (run, *others)}) == 4
@@ -153,7 +155,11 @@ def test_all_trials_start_from_one_actor(tmp_path: Path) -> None:
     another = small_run(tmp_path, "ppo", PRETRAINED, steps=128, validations=1, start=run_folder)
     assert task_name(another) == task_name(given)  # what counts is the actor, wherever it is
     search(given, 1, tmp_path / "given")
-    assert [entry.name for entry in sorted((tmp_path / "given").iterdir())] == [BEST, JOURNAL]
+    assert [entry.name for entry in sorted((tmp_path / "given").iterdir())] == [
+        BEST,
+        JOURNAL,
+        seal_path(Path(JOURNAL)).name,
+    ]
 
 
 def command(folder: Path, *options: str) -> list[str]:

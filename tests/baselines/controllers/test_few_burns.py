@@ -66,7 +66,7 @@ def test_two_impulses_cost_the_closed_form(periods: float) -> None:
     scenario = quiet("reconfiguration", max_accel_m_s2=1.0)
     phase = dataclasses.replace(scenario.phases[0], transfer_orbits=periods)
     scenario = dataclasses.replace(scenario, phases=(phase,))
-    gains = {"correction": {"miss_m": 1.0}, "keeping": {"band_m": 1e5}}
+    gains = {"correction": {"miss_m": 1.0}, "station_keeping": {"band_m": 1e5}}
     flown = evaluate(make_policy("two_impulse", scenario, gains), scenario, [0])
     assert flown["delta_v_m_s"][0] == pytest.approx(closed_form(scenario), rel=0.015)
 
@@ -117,7 +117,7 @@ def test_coasting_sums_are_sums(window: int) -> None:
 
 def test_a_deadband_rests_within_its_band() -> None:
     """HCW's own ellipse stays: from the reference nothing fires; from 20 m off it does, and comes within the band."""
-    gains = {"keeping": {"band_m": 10.0, "look_ahead_orbits": 0.5}}
+    gains = {"station_keeping": {"band_m": 10.0, "look_ahead_orbits": 0.5}}
     still = quiet("keeping", 0.002)
     resting = Counting(make_policy("deadband", still, gains))
     assert evaluate(resting, still, [0])["delta_v_m_s"][0] == 0

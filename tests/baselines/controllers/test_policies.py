@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from baselines import POLICIES, make_policy
-from baselines.controllers.registry import gains_path, read_gains
+from baselines.controllers.registry import read_settings, settings_path
 from formation_env import ENV_IDS, ConfigError, FormationVectorEnv, load_scenario, scenario_names
 from formation_env.numerics.arrays import Array
 from formation_env.task.observation import SIZE, SLICES, observation_layout
@@ -28,7 +28,7 @@ def test_every_policy_flies_every_shipped_scenario(shipped: str) -> None:
     scenario = dataclasses.replace(scenario, dt_s=max(10.0, scenario.dt_s))
     env = FormationVectorEnv(3, scenario)
     for name in POLICIES:
-        policy, other = (make_policy(name, scenario, gains_path(shipped)) for _ in range(2))
+        policy, other = (make_policy(name, scenario, settings_path(shipped)) for _ in range(2))
         observation, _ = env.reset(seed=0)
         for _ in range(5):
             action, state = policy.predict(observation)
@@ -113,16 +113,16 @@ def test_stable_baselines3_evaluates_a_baseline() -> None:
 def test_gains_come_from_the_scenarios_file(tmp_path: Path) -> None:
     """By id, by name, by an equal object, by a changed object, and by an explicit file."""
     keeping = load_scenario("keeping")
-    assert gains_path("FormationKeeping-v0").name == "keeping.yaml"
-    assert gains_path("keeping").name == "keeping.yaml"
-    assert gains_path(keeping).name == "keeping.yaml"
-    assert gains_path(Scenario(phases=keeping.phases)).name == "default.yaml"
+    assert settings_path("FormationKeeping-v0").name == "keeping.yaml"
+    assert settings_path("keeping").name == "keeping.yaml"
+    assert settings_path(keeping).name == "keeping.yaml"
+    assert settings_path(Scenario(phases=keeping.phases)).name == "default.yaml"
     own = tmp_path / "own.yaml"
     own.write_text("smc:\n  boundary_m: 3\n")
-    assert make_policy("smc", "keeping", own).gains.boundary_m == 3
-    assert make_policy("smc", "keeping", {"boundary_m": 4.0}).gains.boundary_m == 4
+    assert make_policy("smc", "keeping", own).settings.boundary_m == 3
+    assert make_policy("smc", "keeping", {"boundary_m": 4.0}).settings.boundary_m == 4
     settings = POLICIES["smc"].Settings(boundary_m=5.0)
-    assert make_policy("smc", "keeping", settings).gains is settings
+    assert make_policy("smc", "keeping", settings).settings is settings
 
 
 FAULTS = {
@@ -150,7 +150,7 @@ def test_wrong_gains_are_refused_in_one_line(text: str, tmp_path: Path) -> None:
     path = tmp_path / "gains.yaml"
     path.write_text(text)
     with pytest.raises(ConfigError) as error:
-        read_gains(name, path)
+        read_settings(name, path)
     assert str(error.value).startswith(f"{path}: ")
     assert key in str(error.value)
     assert "\n" not in str(error.value)
@@ -164,5 +164,5 @@ def test_unknown_names_are_refused() -> None:
         make_policy("lqr", "kepping")
     with pytest.raises(ConfigError, match=r"nowhere\.yaml"):
         make_policy("lqr", "keeping", "nowhere.yaml")
-    with pytest.raises(ConfigError, match="gains of lqr: hold: must be a mapping"):
+    with pytest.raises(ConfigError, match="settings of lqr: hold: must be a mapping"):
         make_policy("lqr", "keeping", {"hold": 3})

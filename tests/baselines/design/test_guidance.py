@@ -11,7 +11,7 @@ from baselines import make_policy
 from baselines.design.guidance import (
     PATHS,
     Guidance,
-    Guide,
+    GuidanceName,
     hohmann_path,
     least_cost_path,
     least_fuel_path,
@@ -63,7 +63,7 @@ def test_least_fuel_path_arrives(name: str, index: int) -> None:
 
 
 @pytest.mark.parametrize("guide", PATHS)
-def test_tracking_agrees_with_the_truths_clock(guide: Guide) -> None:
+def test_tracking_agrees_with_the_truths_clock(guide: GuidanceName) -> None:
     """Through transfer and hold: desired + error is the estimate, and desired + residual leads to the next desired.
 
     Desired states are looked up from single precision: 1e-7 of 2 km, and of n times that.
@@ -159,7 +159,7 @@ def test_hohmann_path_waits_on_the_reference() -> None:
     np.testing.assert_allclose(path[:301, :3], coasting[:, :3], atol=1e-6)
 
 
-REFUSED: dict[str, tuple[Guide, AnyFormation, float, str]] = {
+REFUSED: dict[str, tuple[GuidanceName, AnyFormation, float, str]] = {
     "too short": ("hohmann", Parallel(), 0.4, "hohmann: phases.0.transfer_orbits: must be at least 0.5"),
     "another plane": ("hohmann", ProjectedCircle(), 0.5, "hohmann: phases.0.formation: must be in the plane of"),
     "no leverage": ("two_impulse", SpaceCircle(), 0.5, "phases.0.transfer_orbits: time_s: no two impulses"),

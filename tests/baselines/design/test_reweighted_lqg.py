@@ -10,7 +10,7 @@ from scipy.sparse import coo_matrix, csr_matrix, eye, hstack, kron, vstack
 
 from baselines import make_policy
 from baselines.design.phase_tables import nominal_start, start_error
-from baselines.design.reweighted_lqg import Knowledge, knowledge, reweighted_gains, spread
+from baselines.design.reweighted_lqg import Knowledge, ReweightedLQGSettings, knowledge, reweighted_gains, spread
 from formation_env import FormationVectorEnv, load_scenario
 from formation_env.dropout import NoDropout
 from formation_env.evaluation.rollout import evaluate
@@ -52,7 +52,7 @@ def test_a_perfect_sensor_leaves_nothing_unknown(dt_s: float) -> None:
     np.testing.assert_allclose(
         known.learned[1:], np.tile(Q_noise, (scenario.num_steps, 1, 1)), atol=1e-9 * Q_noise.max()
     )
-    assert np.isfinite(reweighted_gains(scenario, rounds=0)[0]).all()
+    assert np.isfinite(reweighted_gains(scenario, ReweightedLQGSettings(rounds=0))[0]).all()
 
 
 def test_predicted_scatter_is_what_is_flown() -> None:

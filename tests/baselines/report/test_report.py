@@ -18,13 +18,14 @@ from baselines.__main__ import app
 from baselines.controllers.reference_policies import Random, RandomSettings, Zero, ZeroSettings
 from baselines.controllers.registry import POLICIES as CLASSICAL
 from baselines.experiments.comparison import Flown
-from baselines.experiments.statistics import Results, analyse, significant
+from baselines.experiments.estimates import significant
+from baselines.experiments.statistics import Results, analyse
 from baselines.experiments.sweep import BOUND
 from baselines.experiments.variations import FRONT, VARIATIONS
-from baselines.report import FILES, Table, Wanted, style, write_report
+from baselines.report import FILES, ReportOptions, Table, style, write_report
 from baselines.report.flight_figures import outage_path
 from baselines.report.scales import Scale, round_values
-from baselines.report.words import numbers
+from baselines.report.text import numbers
 from formation_env import ConfigError, Scenario, load_scenario
 from formation_env.files import write_texts
 from formation_env.kernel.metrics import METRICS
@@ -56,7 +57,14 @@ def only_short(original: Scenario, believed: Scenario) -> Zero | None:
 
 POLICIES = {"zero": zero, "random": random, "learned_one": only_short}
 FEW = 2
-WANTED = Wanted(EPISODES, FEW, sweep_episodes=2, sweep_bound_episodes=1, slow=("random",), unswept=("random",))
+OPTIONS = ReportOptions(
+    episodes=EPISODES,
+    slow_episodes=FEW,
+    sweep_episodes=2,
+    sweep_bound_episodes=1,
+    slow=("random",),
+    unswept=("random",),
+)
 
 
 def short_scenarios() -> list[Scenario]:
@@ -67,7 +75,7 @@ def short_scenarios() -> list[Scenario]:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("report") / "deep" / "folder"
-    assert write_report(POLICIES, short_scenarios(), WANTED, out, COMMAND) == out / "report.html"
+    assert write_report(POLICIES, short_scenarios(), OPTIONS, out, COMMAND) == out / "report.html"
     return out
 
 
@@ -146,7 +154,8 @@ def test_easy_seeds_do_not_win() -> None:
     assert (results.ranking, results.reference, results.partial) == (["full", "slow"], "full", ["slow"])
     assert results.cost("slow")[0] == pytest.approx(np.mean(full) + 1)
     assert results.behind("full", "slow") == pytest.approx((1, 1, 1))
-    assert results.cost_ratios["slow"][0] == pytest.approx(np.mean(slow) / 0.5)
+    assert results.cost_ratios_flown["slow"][0] == pytest.approx(np.mean(slow) / 0.5)
+    assert results.cost_ratios["slow"][0] == pytest.approx((np.mean(full) + 1) / 0.5)  # the basis of its cost
     low, high = results.cost("slow")[1:]
     # the difference is the same everywhere, so all that is uncertain is the reference's mean
     assert (low, high) == pytest.approx(tuple(end + 1 for end in results.cost("full")[1:]))
@@ -177,8 +186,9 @@ def test_json_is_complete(folder: Path) -> None:
             assert policy["episodes"] == (FEW if name == "random" else EPISODES)
             assert policy["action_time_us"] > 0
             assert policy["cost_m_s"]["mean"] == -policy["summary"]["return"]["mean"]
-            best = environment["ranking"][0]
+            best = environment["best"]
             assert name == best or set(policy["paired_differences"][best]["return"]) == {"mean", "low", "high"}
+            assert policy["estimated"] == (name == "random")
 
 
 def _rebuilt(settings: dict[str, object]) -> Scenario:
@@ -197,7 +207,7 @@ def test_page_holds_everything_and_loads_nothing(folder: Path) -> None:
     assert all(name in own for name in POLICIES)
     assert not re.search(r"https?://|<link|<iframe|@import|url\(|\bsrc\s*=", own)
     assert "default-src 'none'" in own
-    assert own.count("Plotly.newPlot") == 6 * len(short_scenarios())
+    assert own.count('class="plot"') == 1 + 6 * len(short_scenarios()) + 1  # paired differences need two policies
     assert len(page) < 8e6
 
 
@@ -205,14 +215,16 @@ def test_the_page_says_who_wins_and_who_flew_less(folder: Path) -> None:
     """A sentence per environment at the top, with the numbers of the data; why some flew fewer seeds."""
     page = (folder / "report.html").read_text(encoding="utf-8").replace(get_plotlyjs(), "")
     data = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-    top = page[: page.index("Mean cost in m/s")]
+    top = page[page.index("Result by environment") : page.index('class="environment"')]
     for found in data["environments"].values():
-        best = found["ranking"][0]
+        best = found["best"]
         cost, over = (found["policies"][best][key] for key in ("cost_m_s", "cost_ratio"))
         mean, (ratio, low, high) = numbers(tuple(cost.values()))[0], numbers(tuple(over.values()))
-        assert f"{best} wins at {mean} m/s, {ratio} [{low}, {high}] times" in top
-        assert f"next is {found['ranking'][1]}, " in top
-    assert page.count("Too slow for all 3 seeds: random (2) flew the first ones only") == len(data["environments"])
+        assert f"{best} has the lowest mean cost, {mean} m/s, {ratio} [{low}, {high}] times" in top
+        assert f"next in rank is {next(name for name in found['ranking'] if name != best)}, " in top
+        assert "too few for a verdict" in top
+        assert "significant" not in top
+    assert page.count("Too slow for all 3 seeds: random (2) flew only the first.") == len(data["environments"])
 
 
 def test_fronts_and_robustness_are_in_the_report(folder: Path) -> None:
@@ -231,9 +243,11 @@ def test_fronts_and_robustness_are_in_the_report(folder: Path) -> None:
 def test_no_front_where_none_is_possible(tmp_path: Path) -> None:
     """An error without a price has no front; the report says so, and is written all the same."""
     free = build(Scenario, SHORT | {"reward": {"error_weight": 0.0}}, "test")
-    page = write_report({"random": random, "zero": zero}, [free], Wanted(2, unswept=()), tmp_path, COMMAND)
-    assert "No front and no robustness: sweep: " in page.read_text(encoding="utf-8")
-    assert "must be &gt; 0 for a front, got 0" in page.read_text(encoding="utf-8")
+    page = write_report(
+        {"random": random, "zero": zero}, [free], ReportOptions(episodes=2, unswept=()), tmp_path, COMMAND
+    )
+    assert "No trade-off and no robustness: sweep: " in page.read_text(encoding="utf-8")
+    assert "must be &gt; 0 for a trade-off, got 0" in page.read_text(encoding="utf-8")
     assert len(pd.read_csv(tmp_path / "sweep.csv")) == 0
 
 
@@ -245,14 +259,16 @@ def test_further_tables_stand_on_the_page_and_beside_it(tmp_path: Path) -> None:
         return [Table("own", "A table", ("environment", "best, m/s"), rows, "What it means.")]
 
     (scenario,) = short_scenarios()[1:]
-    write_report({"zero": zero}, [scenario], Wanted(2, sweep_episodes=0), tmp_path, COMMAND, tables=tables)
+    write_report(
+        {"zero": zero}, [scenario], ReportOptions(episodes=2, sweep_episodes=0), tmp_path, COMMAND, tables=tables
+    )
     lines = ["| environment | best, m/s |", "| --- | --- |", f"| {scenario.title} | <zero> |", "", "What it means."]
     assert (tmp_path / "own.md").read_text().splitlines() == lines
     page = (tmp_path / "report.html").read_text()
     assert "<h2>A table</h2>" in page
     assert "&lt;zero&gt;" in page
     data = json.loads((tmp_path / "report.json").read_text())
-    assert data["tables"][0]["rows"] == [[scenario.title, "<zero>"]]
+    assert data["tables"][0]["rows"] == [{"environment": scenario.title, "best, m/s": "<zero>"}]
 
 
 def test_a_failure_leaves_the_old_files(folder: Path, tmp_path: Path) -> None:
@@ -265,7 +281,7 @@ def test_a_failure_leaves_the_old_files(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "report.html").write_text("old")
     policies = {"zero": zero, "failing": lambda original, believed: Failing(believed, ZeroSettings())}
     with pytest.raises(RuntimeError, match="in mid-flight"):
-        write_report(policies, short_scenarios(), WANTED, tmp_path, COMMAND)
+        write_report(policies, short_scenarios(), OPTIONS, tmp_path, COMMAND)
     assert {path.name for path in tmp_path.iterdir()} <= {"report.html", "bounds"}
     assert (tmp_path / "report.html").read_text() == "old"
 
@@ -295,14 +311,14 @@ def test_files_are_written_all_or_none(tmp_path: Path, monkeypatch: pytest.Monke
 def test_wrong_environments_are_named(tmp_path: Path, envs: list[str], message: str) -> None:
     """A mistake in the command is found before anything flies."""
     with pytest.raises(ConfigError, match=message):
-        write_report(POLICIES, envs, WANTED, tmp_path / "out", COMMAND)
+        write_report(POLICIES, envs, OPTIONS, tmp_path / "out", COMMAND)
     assert not (tmp_path / "out").exists()
 
 
 def test_an_environment_without_policy_is_refused(tmp_path: Path) -> None:
     """A report without a line says nothing."""
     with pytest.raises(ConfigError, match="no policy for keeping_nonlinear"):
-        write_report({"none": lambda original, believed: None}, ["keeping_nonlinear"], WANTED, tmp_path, COMMAND)
+        write_report({"none": lambda original, believed: None}, ["keeping_nonlinear"], OPTIONS, tmp_path, COMMAND)
     assert not list(tmp_path.iterdir())
 
 

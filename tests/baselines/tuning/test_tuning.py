@@ -11,11 +11,11 @@ from typer.testing import CliRunner
 
 from baselines.__main__ import app
 from baselines.cli_tune import task
-from baselines.controllers.registry import POLICIES, make_policy, read_gains
+from baselines.controllers.registry import POLICIES, make_policy, read_settings
 from baselines.experiments.policy_batch import SideBySide
 from baselines.tuning import study
-from baselines.tuning.gain_file import replace_section
 from baselines.tuning.knobs import KNOBS, first_gains, knobs_for, present_gains, read, turn
+from baselines.tuning.settings_file import replace_section
 from baselines.tuning.study import Task, costs, open_study, search
 from formation_env import load_scenario
 from formation_env.evaluation import rollout
@@ -156,7 +156,7 @@ def test_command_writes_gains_that_load_and_are_no_worse(tmp_path: Path) -> None
     assert path.name == "keeping.yaml"
     assert "python -m baselines tune keeping --policy smc --trials 10 --episodes 4\n" in path.read_text()
     scenario = load_scenario("keeping")
-    default = read_gains("smc", Path(__file__).parents[3] / "configs" / "baselines" / "default.yaml")
+    default = read_settings("smc", Path(__file__).parents[3] / "configs" / "baselines" / "default.yaml")
     both = [make_policy("smc", scenario, gains) for gains in (default, path)]
     before, after = costs(both, scenario, range(2_000_000, 2_000_004))
     assert after <= before

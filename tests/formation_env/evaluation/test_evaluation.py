@@ -131,7 +131,7 @@ def test_summary_has_mean_and_interval_of_each_metric() -> None:
     np.testing.assert_allclose(summary["mean"], table[list(METRICS)].mean())
     assert (summary["low"] <= summary["mean"]).all()
     assert (summary["mean"] <= summary["high"]).all()
-    assert summary.loc["steps"].tolist() == [145, 145, 145]
+    assert summary.loc["steps"].tolist() == [145, 145, 145, 12]
     pd.testing.assert_frame_equal(summarise(table), summary)
 
 

@@ -13,7 +13,6 @@ from scipy import stats
 
 from formation_env import FormationEnv, FormationVectorEnv, Scenario, Spacecraft, load_scenario, propagate
 from formation_env.dropout import Bernoulli, GilbertElliott, NoDropout, Window, Windows
-from formation_env.kernel import tile
 from formation_env.navigation.filter_settings import KalmanFilter
 from formation_env.navigation.sensor import Sensor
 from formation_env.task.observation import observation_layout
@@ -231,5 +230,5 @@ def test_position_sensor_leaves_the_first_velocity_alone() -> None:
     infos = env.reset(seed=0)[1]
     nominal = scenario.start.formation.state(scenario.orbit)
     np.testing.assert_array_equal(infos["estimate"][:, 3:], np.tile(nominal[3:], (3, 1)))
-    np.testing.assert_allclose(env.simulation.state(tile.P_CROSS_TRACK, 3)[:, 2], 0.05**2, rtol=1e-12)
+    np.testing.assert_allclose(env.simulation.read("covariance_cross_track")[:, 2], 0.05**2, rtol=1e-12)
     assert (np.abs(infos["estimate"][:, :3] - infos["true_state"][:, :3]) < 10).all()

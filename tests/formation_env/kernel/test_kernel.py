@@ -64,17 +64,21 @@ def test_unpack_reads_what_pack_wrote(name: str) -> None:
 def test_fields_of_the_tile_do_not_overlap() -> None:
     """Each field has its own lanes, and the results are those that the environments read."""
     lanes = formation_env.numerics.jit.LANES
-    simulation = Simulation(load_scenario("keeping"), 33)
     sizes = {"TRUTH": 6, "ESTIMATE": 6, "P_IN_PLANE": 10, "P_CROSS_TRACK": 3, "KEY": 2, "THRUST": 3, "ACTION": 3}
     spans = [
         (value, value + sizes.get(name, 1) * lanes)
         for name, value in vars(tile).items()
         if name.isupper()
         and name not in ("LANES", "STATE_FIELDS", "NUM_RESULTS", "TILE_FIELDS", "RESULTS", "FIRST_TOTAL", "NUM_TOTALS")
+        and isinstance(value, int)
     ]
     spans.sort()
     assert all(end <= start for (_, end), (start, _) in itertools.pairwise(spans))
-    assert len(simulation.results) == tile.NUM_RESULTS
+    named = [
+        *tile.STATES.values(),
+        *(span._replace(first=span.first + tile.RESULTS // lanes) for span in tile.STEP_RESULTS.values()),
+    ]
+    assert {(first * lanes, (first + size) * lanes) for first, size in named} <= set(spans)
 
 
 def test_rows_of_the_padding_do_not_show() -> None:

@@ -1,4 +1,4 @@
-"""Gain files with comments, section by section."""
+"""Settings files with comments, section by section."""
 
 import re
 from io import StringIO
@@ -8,25 +8,27 @@ from typing import Any
 from formation_env.files import write_texts
 
 
-def write_section(path: Path, policy: str, gains: dict[str, Any], comment: str) -> None:
-    """Put a policy's gains into a gain file; what else is in it stays.
+def write_section(path: Path, policy: str, settings: dict[str, Any], comment: str) -> None:
+    """Put a policy's settings into a settings file; what else is in it stays.
 
     Args:
         path: of the file; made, with its folder, if it does not exist.
         policy: its name.
-        gains: the section.
+        settings: the section.
         comment: lines above it.
 
     Raises:
         OSError: the file cannot be written.
     """
-    text = path.read_text() if path.is_file() else f"# Gains of the classical policies for {path.stem}.\n"
-    write_texts(path.parent, {path.name: replace_section(text, policy, section(policy, gains, comment))})
+    text = (
+        path.read_text(encoding="utf-8") if path.is_file() else f"# Gains of the classical policies for {path.stem}.\n"
+    )
+    write_texts(path.parent, {path.name: replace_section(text, policy, section(policy, settings, comment))})
 
 
-def section(policy: str, gains: dict[str, Any], comment: str) -> str:
-    """A policy's section of a gain file, as text with a comment above it."""
-    return commented({policy: gains}, comment)
+def section(policy: str, settings: dict[str, Any], comment: str) -> str:
+    """A policy's section of a settings file, as text with a comment above it."""
+    return commented({policy: settings}, comment)
 
 
 def commented(data: dict[str, Any], comment: str) -> str:
@@ -41,7 +43,7 @@ def commented(data: dict[str, Any], comment: str) -> str:
 
 
 def replace_section(text: str, policy: str, new: str) -> str:
-    """A gain file's text with a policy's section, and the comment right above it, replaced, or added at its end."""
+    """A settings file's text with a policy's section, and the comment right above it, replaced, or added at its end."""
     old = re.compile(rf"^(?:#.*\n)*{policy}:.*\n(?:[ \t].*\n|\n(?=[ \t]))*", re.MULTILINE)
     if old.search(text):
         return old.sub(lambda _: new, text, count=1)

@@ -1,0 +1,26 @@
+"""The algorithms' search spaces (`CommonSettings.search_space`) in the terms of `baselines.tuning`."""
+
+from dataclasses import asdict
+
+from agents.hyperparameters import CommonSettings
+from baselines.tuning.knobs import Knob, read, turn
+from formation_env.settings import build
+
+
+def search_space(algorithm: type[CommonSettings]) -> tuple[Knob, ...]:
+    """Searched hyperparameters of an algorithm with their limits."""
+    return tuple(
+        Knob((name,), limits.low, limits.high, log=limits.log) for name, limits in algorithm.search_space.items()
+    )
+
+
+def current_values(agent: CommonSettings) -> dict[str, float]:
+    """Values of the searched hyperparameters by name, clipped to their limits."""
+    dimensions = search_space(type(agent))
+    values = read(asdict(agent), dimensions)
+    return {dimension.name: min(max(values[dimension.name], dimension.low), dimension.high) for dimension in dimensions}
+
+
+def apply(agent: CommonSettings, values: dict[str, float]) -> CommonSettings:
+    """Hyperparameters with searched values by name, rounded to three digits."""
+    return build(type(agent), turn(asdict(agent), search_space(type(agent)), values), "tune")

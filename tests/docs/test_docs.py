@@ -1,0 +1,164 @@
+"""README and docs: their code runs, their scenarios are valid, their commands, links, keys and defaults exist."""
+
+import re
+from dataclasses import MISSING, fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from ruamel.yaml import YAML
+
+from formation_env import ENV_IDS, Scenario, load_scenario, scenario_names
+from formation_env.dropout import DROPOUTS
+from formation_env.evaluation import evaluate
+from formation_env.evaluation.seeds import seeds
+from formation_env.formations import FORMATIONS
+from formation_env.kernel.metrics import METRICS
+from formation_env.settings import build
+from formation_env.task.observation import markdown_table
+from formation_env.task.randomization import DomainRandomization
+from formation_env.task.scenario import Phase
+
+ROOT = Path(__file__).parents[2]
+PAGES = {str(path.relative_to(ROOT)): path.read_text("utf-8") for path in [ROOT / "README.md", *ROOT.glob("docs/*.md")]}
+IN_A_PROCESS_OF_ITS_OWN = "docs/extending.md"
+"""Its examples register things, which must not reach the other tests."""
+
+
+def blocks(language: str) -> list[Any]:
+    """Code blocks of a language on all pages, each named by its page and line."""
+    found = []
+    for page, text in PAGES.items():
+        for block in re.finditer(rf"^```{language}\n(.*?)^```", text, re.DOTALL | re.MULTILINE):
+            line = text.count("\n", 0, block.start()) + 1
+            found.append(pytest.param(page, block[1], id=f"{page}:{line}"))
+    return found
+
+
+def parse(cell: str) -> Any:
+    """A value as YAML 1.2 reads it."""
+    return YAML(typ="safe", pure=True).load(cell)
+
+
+@pytest.mark.parametrize(("page", "code"), [b for b in blocks("python") if b.values[0] != IN_A_PROCESS_OF_ITS_OWN])
+def test_python_examples_run(page: str, code: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """Every example runs as it stands."""
+    exec(compile(code, page, "exec"), {})
+    if "print(" in code:
+        assert capsys.readouterr().out.strip()
+
+
+@pytest.mark.parametrize(("page", "code"), blocks("yaml"))
+def test_yaml_examples_are_scenarios(page: str, code: str, tmp_path: Path) -> None:
+    """Every YAML block is a valid scenario."""
+    path = tmp_path / "example.yaml"
+    path.write_text(code, encoding="utf-8")
+    load_scenario(path)
+
+
+def test_the_readmes_episode_is_typical(capsys: pytest.CaptureFixture[str]) -> None:
+    """The ten lines print the cost that the README says, within 1 % of the median of the 100 test seeds."""
+    from baselines import make_policy
+
+    code = re.search(r"```python\n(.*?)```", PAGES["README.md"], re.DOTALL)
+    assert code is not None
+    exec(compile(code[1], "README.md", "exec"), {})
+    printed = capsys.readouterr().out.strip()
+    assert f"prints `{printed}`" in PAGES["README.md"]
+    costs = -evaluate(make_policy("lqr", "FormationKeeping-v0"), "FormationKeeping-v0", seeds("test", 100))["return"]
+    assert float(printed.split()[1]) == pytest.approx(costs.median(), rel=0.01)
+
+
+def test_observation_table_is_the_layout() -> None:
+    """The table is the one that `formation-env env show-observation` prints, letter for letter."""
+    assert markdown_table() in PAGES["docs/environment.md"]
+
+
+def test_environments_have_the_steps_that_the_table_says() -> None:
+    """One line per registered id, with the number of its steps."""
+    for env_id in ENV_IDS:
+        (line,) = re.findall(rf"^\| `{env_id}` \|.*$", PAGES["docs/environment.md"], re.MULTILINE)
+        assert line.split("|")[4].strip() == str(load_scenario(env_id).num_steps)
+
+
+def test_names_are_complete() -> None:
+    """All ids, scenarios and metrics stand where a reader looks for them."""
+    assert [name for name in ENV_IDS if f"`{name}`" not in PAGES["README.md"]] == []
+    assert [name for name in scenario_names() if f"`{name}`" not in PAGES["docs/scenarios.md"]] == []
+    assert [name for name in METRICS if f"| `{name}` |" not in PAGES["docs/glossary.md"]] == []
+
+
+def keys(prefix: str, cls: Any) -> dict[str, Any]:
+    """Dotted keys of a settings class and their defaults; classes within are walked, registries are not."""
+    found: dict[str, Any] = {}
+    for field in fields(cls):
+        default = None if field.default is MISSING else field.default
+        if field.name == "kind" or field.name in ("leader_spacecraft", "domain_randomization", "phases"):
+            continue
+        if is_dataclass(default) and field.name != "formation" and field.name != "dropout":
+            found |= keys(f"{prefix}{field.name}.", type(default))
+        else:
+            found[f"{prefix}{field.name}"] = "-" if field.default is MISSING else default
+    return found
+
+
+def test_scenario_keys_and_defaults() -> None:
+    """docs/scenarios.md has every key with its default, and none that does not exist."""
+    rows = re.findall(r"^\| `([a-z0-9_.]+)` \| (\S.*?) \| ", PAGES["docs/scenarios.md"], re.MULTILINE)
+    said = {key: "-" if value == "-" else parse(value) for key, value in rows if value[0] != "`"}
+    known = keys("", Scenario) | keys("phases.", Phase) | keys("domain_randomization.", DomainRandomization)
+    known["dropout.kind"] = known.pop("dropout").kind
+    known["start.formation"] = {"kind": known["start.formation"].kind}
+    for registry in (FORMATIONS, DROPOUTS):
+        for kind, cls in registry.items():
+            known |= keys(f"{kind}.", cls)
+    known["windows.windows"] = [{"start_s": 0, "duration_s": 3000}]
+    known |= {"at_leader": "-"}
+    shipped = set(scenario_names())
+    assert {key: value for key, value in said.items() if key not in shipped} == known
+
+
+def test_every_shipped_kind_builds_from_its_documented_keys() -> None:
+    """The kinds of the tables are those of the registries."""
+    for name, registry in (("scenarios", FORMATIONS), ("models", DROPOUTS)):
+        for kind, cls in registry.items():
+            assert re.search(rf"`{kind}[.`]", PAGES[f"docs/{name}.md"])
+            assert build(cls, {"kind": kind}, "docs").kind == kind
+
+
+def slug(heading: str) -> str:
+    """GitHub's anchor of a heading."""
+    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_links_lead_somewhere(page: str) -> None:
+    """Every relative link is a file, and every anchor a heading."""
+    for target in re.findall(r"\]\(([^)\s]+)\)", PAGES[page]):
+        if target.startswith("http"):
+            continue
+        name, _, anchor = target.partition("#")
+        path = (ROOT / page).parent / name if name else ROOT / page
+        assert path.exists(), target
+        if anchor:
+            text = path.read_text("utf-8")
+            assert anchor in [slug(heading) for heading in re.findall(r"^#+ (.*)$", text, re.MULTILINE)], target
+
+
+def test_index_links_every_page() -> None:
+    """No page is an orphan."""
+    pages = {Path(page).name for page in PAGES} - {"README.md", "index.md"}
+    assert [page for page in sorted(pages) if f"({page})" not in PAGES["docs/index.md"]] == []
+
+
+def results(page: str) -> str:
+    """The marked result table of a page."""
+    (block,) = re.findall(r"<!-- results:begin -->\n(.*?)<!-- results:end -->", PAGES[page], re.DOTALL)
+    return str(block)
+
+
+def test_results_stand_once() -> None:
+    """README's table is the summary of docs/results.md, and no other page has results."""
+    assert results("README.md") == results("docs/results.md")
+    others = [page for page in PAGES if "results:begin" in PAGES[page]]
+    assert sorted(others) == ["README.md", "docs/results.md"]
