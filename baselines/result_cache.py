@@ -11,6 +11,7 @@ import json
 import math
 import re
 import stat
+import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -192,8 +193,8 @@ def _arrays(header: Any, data: bytes) -> Arrays | None:
         if position + count * dtype.itemsize > len(data):
             return None
         values = np.frombuffer(data, dtype, count, position).reshape(shape).copy()
-        if dtype.kind == "U":
-            values.tolist()  # refuses what is not Unicode
+        if dtype.kind == "U" and values.view(np.uint32).max(initial=0) > sys.maxunicode:
+            return None
         result[name] = values
         position += count * dtype.itemsize
     return result if position == len(data) else None

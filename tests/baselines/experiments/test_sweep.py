@@ -280,7 +280,7 @@ def test_the_reading_names_who_costs_least() -> None:
     rows = []
     for value, a, b, bound in ((0.1, 2.0, 3.0, 1.0), (10.0, 8.0, 6.0, 4.0)):
         rows += [(FRONT, value, name, 0, cost) for name, cost in (("a", a), ("b", b), (BOUND, bound))]
-    unlike = [(seed, sign * 1.0) for seed, sign in enumerate((1, -1, 1, -1, 1, -1, 1, -1))]
+    unlike = [(seed, sign * 1.0) for seed, sign in enumerate((1, -1) * 12)]
     for quantity in [name for name in VARIATIONS if name != FRONT]:
         rows += [(quantity, 0.0, "a", seed, 10.0) for seed, _ in unlike]
         rows += [(quantity, 0.0, "b", seed, 10.1 + difference) for seed, difference in unlike]
