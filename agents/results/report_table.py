@@ -33,10 +33,10 @@ COLUMNS: Final = (
 NOTE: Final = (
     "In brackets 95 % intervals. Cost: of the shipped policy, chosen among its training runs on the validation seeds, "
     "on the test seeds of this report. Mean over training seeds: mean test cost of all its training runs, with "
-    "Student's interval over them. Gain from RL: how much reinforcement learning lowered the test cost of the pretrained actor, "
-    "paired by seed. Over bound: mean of each seed's cost over its bound. Over a classical policy: ratio of the mean "
-    f"costs on the seeds of both, with an interval paired by seed; the best one has the lowest mean cost, of "
-    f"{', '.join(LINEAR)}, or of all."
+    "Student's interval over them. Gain from RL: how much reinforcement learning lowered the test cost of the "
+    "pretrained actor, paired by seed. Over bound: mean of each seed's cost over its bound. Over a classical policy: "
+    "ratio of the mean costs on the seeds of both, with an interval paired by seed; the best one has the lowest mean "
+    f"cost, of {', '.join(LINEAR)}, or of all."
 )
 
 

@@ -98,10 +98,10 @@ class Results:
         return negative(self.differences[policy][other]["return"])
 
     def verdict(self, policy: str, other: str) -> bool | None:
-        """Whether the paired costs of two policies differ significantly; None if they share too few seeds to say."""
+        """Whether a policy differs significantly from a compared-with one in cost; None if too few seeds are common."""
         if self.common(policy, other) < MIN_VERDICT_EPISODES:
             return None
-        return significant(self.behind(policy, other))
+        return significant(self.behind(other, policy))
 
     def over(self, policy: str, other: str) -> Interval:
         """Mean cost over another policy's, on the seeds of both."""

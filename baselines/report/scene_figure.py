@@ -99,7 +99,13 @@ def _unseen(corners: np.ndarray) -> go.Scatter3d:
 
 def _scene(sides: np.ndarray) -> dict[str, object]:
     """Three labelled axes of equal scale, seen from far enough to hold a box of the given sides (3,), km."""
-    common = {"gridcolor": style.GRID, "zerolinecolor": style.NEUTRAL, "showbackground": False, "color": style.NEUTRAL}
+    common = {
+        "gridcolor": style.GRID,
+        "zerolinecolor": style.NEUTRAL,
+        "showbackground": False,
+        "nticks": 5,
+        "color": style.NEUTRAL,
+    }
     axes = {f"{name}axis": common | {"title": {"text": title}} for name, title in AXES.items()}
     longest = sides.max() / np.cbrt(sides.prod())  # plotly scales the box to unit volume
     x, y, z = (1.3 + 0.72 * longest) * np.array([0.62, -0.67, 0.41])

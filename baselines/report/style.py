@@ -32,9 +32,9 @@ class Look:
     dash: str
 
 
-# The policies' classes state their looks in colours based on Okabe and Ito's, which colour-blind readers can tell apart.
-# All have a contrast of 3 or more on the light and on the dark page. They are too few, so symbols differ everywhere, and
-# dashes where two colours are close.
+# The policies' classes state their looks, in colours based on Okabe and Ito's, which colour-blind readers can tell
+# apart; all have a contrast of 3 or more on the light and on the dark page. They are too few, so symbols differ
+# everywhere, and dashes where two colours are close.
 _FREE_COLORS: Final = ("#009E73", "#C98500")
 _FREE_SYMBOLS: Final = ("hexagon", "hourglass", "bowtie", "diamond-tall")
 _FREE_DASHES: Final = ("solid", "dash", "dot", "dashdot")

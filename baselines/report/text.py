@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from baselines.controllers.registry import POLICIES
-from baselines.experiments.estimates import MIN_VERDICT_EPISODES, Interval
+from baselines.experiments.estimates import MIN_VERDICT_EPISODES, Interval, negative
 from baselines.experiments.statistics import Results
 
 MAX_DECIMALS = 4
@@ -33,7 +33,9 @@ def _rivals(results: Results) -> list[tuple[str, str]]:
     others = [name for name in results.ranking if name != results.best]
     classical = results.best in POLICIES
     unlike = [name for name in others if (name in POLICIES) != classical]
-    rivals = [("next in rank is", others[0])] if others else []
+    rank = results.ranking.index
+    role = "next in rank is" if others and rank(others[0]) > rank(results.best) else "ranked before it by estimate is"
+    rivals = [(role, others[0])] if others else []
     if unlike and unlike[0] != others[0]:
         rivals.append(("the best learned policy is" if classical else "the best classical policy is", unlike[0]))
     return rivals
@@ -44,10 +46,13 @@ def _rival(results: Results, name: str, role: str) -> str:
     behind = results.behind(results.best, name)
     mean, low, high = numbers(behind)
     cost = results.cost_flown(results.best, name)[0]
-    share = f" ({number(100 * behind[0] / cost)} %)" if cost > 0 else ""
+    share = f" ({number(100 * abs(behind[0]) / cost)} %)" if cost > 0 else ""
     common = results.common(name, results.best)
+    side = "above" if behind[0] >= 0 else "below"
+    if behind[0] < 0:
+        mean, low, high = numbers(negative(behind))
     verdict = _verdict(results, name)
-    return f"{role} {name}, {mean} [{low}, {high}] m/s{share} above it on the same {common} seeds: {verdict}"
+    return f"{role} {name}, {mean} [{low}, {high}] m/s{share} {side} it on the same {common} seeds: {verdict}"
 
 
 def _verdict(results: Results, name: str) -> str:
@@ -96,11 +101,13 @@ def _against_bound(results: Results) -> str:
 def _comparison(results: Results, second: str) -> str:
     """Best against second best, on the same seeds."""
     best = results.best
-    mean, low, high = numbers(results.behind(best, second))
+    behind = results.behind(best, second)
+    more, difference = ("more", behind) if behind[0] >= 0 else ("less", negative(behind))
+    mean, low, high = numbers(difference)
     common = results.common(best, second)
     ours, theirs = (results.flown.episodes[name]["return"].to_numpy()[:common] for name in (best, second))
     text = (
-        f"Next in rank is {second}: it costs {mean} m/s more on the same seeds (95 % interval {low} to {high}), and "
+        f"Compared with it, {second} costs {mean} m/s {more} on the same seeds (95 % interval {low} to {high}), and "
         f"{best} is better on {int(np.sum(ours > theirs))} of {common}. "
     )
     verdict = results.verdict(second, best)

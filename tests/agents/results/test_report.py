@@ -26,6 +26,7 @@ from agents.results.report import Learned, envs_of, parse_models
 from baselines.controllers.registry import POLICIES
 from baselines.experiments.policy_factories import describe
 from baselines.experiments.sweep import points
+from baselines.report import ReportOptions
 from formation_env import ENV_IDS, ConfigError, Scenario, load_scenario
 from formation_env.evaluation.rollout import evaluate
 from formation_env.evaluation.seeds import seeds
@@ -247,6 +248,27 @@ def test_pickle_is_refused_without_the_flag(tmp_path: Path, monkeypatch: pytest.
     assert result.exit_code == MISTAKE
     assert "holds pickled objects, which may run any code when they are loaded; give --allow-pickle" in result.stderr
     assert result.stderr.count("\n") == 1
+
+
+def test_a_model_of_ones_own_enters_the_report(tmp_path: Path) -> None:
+    """A .zip flies on the environments that are named, with the power that it is given; not without permission."""
+    model, path = make_model(PPO, tmp_path)
+    options = ReportOptions(episodes=EPISODES, slow_episodes=1, sweep_episodes=0)
+    given = ([f"mine={path}"], [START], options, tmp_path / "out", "command", 1, ["lqr"])
+    with pytest.raises(ConfigError, match="give --allow-pickle"):
+        report.report_models(*given)
+    with pytest.raises(ConfigError, match="does not name its environment"):
+        report.report_models([f"mine={path}"], None, options, tmp_path / "out", "command", allow_pickle=True)
+    with pytest.raises(ConfigError, match="needs a label of its own"):
+        report.report_models([f"mine={path}"] * 2, [START], options, tmp_path / "out", "command", allow_pickle=True)
+    assert not (tmp_path / "out").exists()
+    report.report_models(*given, allow_pickle=True, throttle_power=2.0)
+    table = pd.read_csv(tmp_path / "out" / "episodes.csv")
+    expected = evaluate(Sb3Policy(model, 2.0), START, seeds("test", EPISODES))
+    assert set(table["policy"]) == {"lqr", "mine"}
+    np.testing.assert_allclose(table.loc[table["policy"] == "mine", "return"], expected["return"], rtol=1e-6)
+    first = report.UserModel(path).settings(load_scenario("keeping"))
+    assert first != report.UserModel(path, 2.0).settings(load_scenario("keeping"))
 
 
 def test_a_shipped_file_is_evaluated_against_the_bound(policies: Path, tmp_path: Path) -> None:
