@@ -10,33 +10,48 @@ BASE   := $(VENV)/.stamp-venv
 REPORT := $(VENV)/.stamp-report
 TEST   := $(VENV)/.stamp-test
 INPUTS := pyproject.toml constraints.txt
+# OpenBLAS chooses its kernels by the processor; these are the common ones. Nehalem multiplies without fused adds.
+CORES     := Haswell Zen SkylakeX Nehalem
+NUMERICAL := tests/baselines/design/test_riccati.py tests/baselines/design/test_riccati_solver.py \
+             tests/baselines/design/test_steady_state_filter.py tests/baselines/controllers/test_policy_settings.py \
+             tests/formation_env/dynamics/test_dynamics.py tests/formation_env/orbital
+COMPILED  := tests/formation_env/numerics tests/formation_env/kernel/test_kalman.py \
+             tests/formation_env/kernel/test_kalman_extremes.py
 INSTALL = $(PY) -m pip install --quiet -c constraints.txt -e
 
 .DEFAULT_GOAL := help
-.PHONY: help report report-full thesis test check bench clean
+.PHONY: help report report-full thesis test test-portable check bench clean
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 
 help: ## Show this list
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-11s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-13s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
 report: $(REPORT) ## Learned and classical policies on the four environments (EPISODES=100 OUT=reports/)
 	$(PY) -m agents report --episodes $(EPISODES) --out $(OUT) $(ARGS)
 
-report-full: $(REPORT) ## The same with all seeds for mpc, too, and finer fronts; goes on where it was interrupted
+report-full: $(REPORT) ## The same with all seeds for mpc and finer fronts; continues after an interrupt
 	$(PY) -m agents report --episodes $(EPISODES) --slow-episodes $(EPISODES) --sweep-episodes 50 --bound-episodes 20 \
 		--fine --resume --out $(OUT)
 
 thesis: $(REPORT) ## The source thesis's figures and claims, reproduced (OUT=reports/): OUT/thesis/thesis.html
-	$(PY) -m baselines reproduce --out $(patsubst %/,%,$(OUT))/thesis $(ARGS)
+	$(PY) -m baselines thesis --out $(patsubst %/,%,$(OUT))/thesis $(ARGS)
 
 test: $(TEST) ## Run the tests (ARGS="-k kalman -n 0")
 	$(PY) -m pytest $(ARGS)
 
+test-portable: $(TEST) ## Numerical tests under the arithmetic of other processors (docs/portability.md)
+	@for core in $(CORES); do \
+		if [ $$core = SkylakeX ] && ! grep -q avx512f /proc/cpuinfo; then echo "SkylakeX: no AVX-512 here, skipped"; continue; fi; \
+		echo "OPENBLAS_CORETYPE=$$core"; \
+		OPENBLAS_CORETYPE=$$core $(PY) -m pytest $(NUMERICAL) --durations=0 --durations-min=20 || exit 1; \
+	done
+	NUMBA_CPU_NAME=generic NUMBA_CACHE_DIR=$(VENV)/numba-generic $(PY) -m pytest $(COMPILED) --durations=0 --durations-min=20
+
 check: $(TEST) ## Lint, format and type checks
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
-	$(PY) -m mypy formation_env
+	$(PY) -m mypy
 
 bench: $(REPORT) ## Measure environment steps per second (ARGS="...")
 	$(PY) -m formation_env bench $(ARGS)

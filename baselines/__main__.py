@@ -1,17 +1,15 @@
-"""Command line of the classical policies."""
+"""Command line: `python -m baselines`, the same as `formation-env baselines`."""
 
-import typer
+from formation_env.cli_errors import one_line_errors
 
-from baselines.cli import report, reproduce, sweep
-from baselines.cli_render import render
-from baselines.cli_tune import tune
 
-app = typer.Typer(help=__doc__, no_args_is_help=True, add_completion=False)
-app.command()(tune)
-app.command()(report)
-app.command()(reproduce)
-app.command()(sweep)
-app.command()(render)
+def main() -> None:
+    """Run the commands; imports happen inside, so that an interrupt during them is one line, too."""
+    with one_line_errors():
+        from baselines.cli import app
+
+        app(prog_name="formation-env baselines")
+
 
 if __name__ == "__main__":
-    app()
+    main()

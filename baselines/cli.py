@@ -1,143 +1,115 @@
-"""The commands `report`, `reproduce` and `sweep`. Their libraries are imported only when they run."""
+"""The commands of `formation-env baselines`. What they need is imported when they run."""
 
-import os
-import shlex
-import signal
-import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Final, NoReturn
+from typing import Annotated, ClassVar
 
 import typer
 
-from baselines.controllers.registry import reference_policies, slow_policies
-from baselines.experiments.policy_factories import classical
-from baselines.optimal.cone_solver import SOLVER
-from formation_env.settings import ConfigError
-from formation_env.task.loading import ENV_IDS
+from baselines.cli_report import BoundEpisodes, ReportArguments, write_report_page
+from baselines.cli_tune import EXAMPLE, tune
+from formation_env.cli_errors import DISTRIBUTION
+from formation_env.cli_group import Group, add_command, command_line, make_app
+from formation_env.cli_options import PROCESSES, Envs, Episodes, Out, Policies, Processes, Resume
 
-Envs = Annotated[list[str] | None, typer.Option("--env", help="Id, scenario name or YAML file; may be repeated.")]
-Policies = Annotated[list[str] | None, typer.Option("--policy", help="Name of a policy; may be repeated.")]
-Episodes = Annotated[int, typer.Option(min=1, help="Episodes per policy and environment.")]
-SlowEpisodes = Annotated[int, typer.Option(min=1, help="Of these the first ones, for mpc, which is slow.")]
-SweepEpisodes = Annotated[int, typer.Option(min=0, help="For fronts and robustness; 0 leaves them out.")]
-BoundEpisodes = Annotated[int, typer.Option(min=0, help="Of these, for the fronts' bound; 0 is none.")]
-Fine = Annotated[bool, typer.Option("--fine", help="Fronts and robustness at more values.")]
-Out = Annotated[Path, typer.Option(file_okay=False, help="Folder to write to.")]
-Processes = Annotated[int, typer.Option(min=1, help="To fly in.")]
-Resume = Annotated[bool, typer.Option("--resume", help="Keep finished flights in OUT/flown; fly none of them again.")]
-PROCESSES: Final = min(2, os.cpu_count() or 1)
+NAME = "baselines"
 
 
-def report(
-    env: Envs = None,
-    policy: Policies = None,
-    episodes: Episodes = 100,
-    slow_episodes: SlowEpisodes = 5,
-    sweep_episodes: SweepEpisodes = 10,
-    bound_episodes: BoundEpisodes = 2,
-    fine: Fine = False,
-    resume: Resume = False,
-    out: Out = Path("reports"),
-    processes: Processes = PROCESSES,
-) -> None:
-    """Fly the classical policies on the same seeds, and write tables and an HTML page."""
-    command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
+class BaselinesGroup(Group):
+    """The group `baselines`."""
 
-    def write() -> Path:
-        from baselines.report import ReportOptions, write_report
-
-        options = ReportOptions(
-            episodes=episodes,
-            slow_episodes=slow_episodes,
-            sweep_episodes=sweep_episodes,
-            sweep_bound_episodes=bound_episodes,
-            coarse=not fine,
-            resume=resume,
-        )
-        return write_report(classical(policy or (), env or ()), env or list(ENV_IDS), options, out, command, processes)
-
-    run_report("report", out, write)
+    renamed: ClassVar = {"reproduce": f"{DISTRIBUTION} baselines thesis", "render": f"{DISTRIBUTION} env render"}
+    renamed_options: ClassVar = {
+        command: {"--env": f"an argument, {DISTRIBUTION} baselines {command} ENV..."} for command in ("report", "sweep")
+    }
 
 
-def reproduce(
-    episodes: Annotated[int, typer.Option(min=1, help="Test seeds of each flight with noise.")] = 50,
-    out: Out = Path("reports/thesis"),
-    step_s: Annotated[
-        float, typer.Option(min=0.1, max=60.0, help="Time step, s; a coarse one for a quick look.")
-    ] = 1.0,
-    claims: Annotated[bool, typer.Option(help="Judge the claims, too.")] = True,
-    models: Annotated[bool, typer.Option(help="Hold the linear models against the nonlinear truth, too.")] = True,
-    processes: Processes = PROCESSES,
-) -> None:
-    """Redraw the thesis's figures, judge its claims and its models, and write all of it, with one HTML page."""
-    command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
+app = make_app(
+    "Classical guidance and control policies: compare, sweep, tune, and reproduce the thesis.", BaselinesGroup
+)
+
+
+@app.command("list", epilog=f"Example: {DISTRIBUTION} baselines list")
+def list_policies() -> None:
+    """List the classical policies: name and description."""
+    import inspect
+
+    from baselines.controllers.registry import POLICIES
+
+    for name, policy in POLICIES.items():
+        typer.echo(f"{name:18s} {(inspect.getdoc(policy) or '').partition(chr(10))[0]}")
+
+
+def report(arguments: ReportArguments) -> None:
+    """Write the report of the classical policies."""
 
     def write() -> Path:
-        from baselines.thesis.report import Wanted, write_thesis
+        from baselines.experiments.policy_factories import classical
+        from baselines.report import write_report
+        from formation_env.task.loading import ENV_IDS
 
-        return write_thesis(out, Wanted(episodes, step_s, claims=claims, models=models), command, processes)
+        envs = arguments.envs or list(ENV_IDS)
+        policies, command = classical(arguments.policy or (), envs), command_line(NAME)
+        return write_report(policies, envs, arguments.options(), arguments.out, command, arguments.processes)
 
-    run_report("reproduce", out, write)
+    write_report_page(arguments.out, arguments.resume, write)
 
 
+add_command(
+    app,
+    "report",
+    ReportArguments,
+    report,
+    f"{DISTRIBUTION} baselines report keeping --policy lqr --policy mpc --episodes 20 --slow-episodes 20",
+)
+
+
+@app.command(epilog=f"Example: {DISTRIBUTION} baselines sweep keeping --policy lqr --episodes 50 --resume")
 def sweep(
-    scenarios: Annotated[list[str] | None, typer.Argument(help="Ids, names or YAML files, as --env.")] = None,
-    env: Envs = None,
+    envs: Envs = None,
     policy: Policies = None,
-    episodes: Annotated[int, typer.Option(min=1, help="Test seeds of each point.")] = 20,
-    bound_episodes: Annotated[int, typer.Option(min=0, help="Of these, seeds of the bound's front; 0 is none.")] = 5,
+    episodes: Episodes = 20,
+    bound_episodes: BoundEpisodes = 5,
     resume: Resume = False,
     out: Out = Path("reports/sweep"),
     processes: Processes = PROCESSES,
 ) -> None:
-    """Draw thrust against error as its price moves, and cost against noise, outages, limits and wrong models."""
-    command = shlex.join(["python", "-m", "baselines", *sys.argv[1:]])
-    envs = [*(scenarios or ()), *(env or ())] or list(ENV_IDS)
-    names = policy or [name for name in classical() if name not in (*slow_policies(), *reference_policies())]
+    """Plot the delta-v against error trade-off, and cost under perturbed conditions."""
 
     def write() -> Path:
+        from baselines.controllers.registry import reference_policies, slow_policies
+        from baselines.experiments.policy_factories import classical
         from baselines.report.write_sweep import SweepOptions, write_sweep
+        from formation_env.task.loading import ENV_IDS
 
+        flown = envs or list(ENV_IDS)
+        left_out = (*slow_policies(), *reference_policies())
+        names = policy or [name for name in classical() if name not in left_out]
         options = SweepOptions(episodes=episodes, bound_episodes=bound_episodes, resume=resume)
-        return write_sweep(classical(names, envs), envs, options, out, command, processes)
+        return write_sweep(classical(names, flown), flown, options, out, command_line(NAME), processes)
 
-    run_report("sweep", out, write)
-
-
-def run_report(name: str, out: Path, write: Callable[[], Path]) -> None:
-    """Write a report, and end the program with one line if that fails.
-
-    Args:
-        name: of the command.
-        out: folder that it writes to.
-        write: does it, and gives the page's path.
-
-    Raises:
-        SystemExit: 2 after a mistake in the options, 1 after another failure, 130 after an interrupt.
-    """
-    before = signal.signal(signal.SIGTERM, _interrupt)
-    try:
-        page = write()
-    except KeyboardInterrupt:
-        _end(f"{name}: interrupted, no report written", 130)
-    except ModuleNotFoundError as error:
-        missing = str(error.name).split(".")[0]
-        extra = "optimal" if missing == SOLVER else "report"
-        _end(f"{name}: needs {missing}; install it with: pip install 'formation-env[{extra}]'", 1)
-    except ConfigError as error:
-        _end(str(error), 2)
-    except OSError as error:
-        _end(f"{name}: {out}: cannot be written: {error.strerror or error}", 1)
-    finally:
-        signal.signal(signal.SIGTERM, before)
-    typer.echo(f"wrote {page}")
+    write_report_page(out, resume, write)
 
 
-def _interrupt(*_: Any) -> NoReturn:
-    raise KeyboardInterrupt
+app.command(epilog=f"Example: {EXAMPLE}")(tune)
 
 
-def _end(message: str, code: int) -> NoReturn:
-    typer.echo(message, err=True)
-    raise SystemExit(code)
+@app.command(epilog=f"Example: {DISTRIBUTION} baselines thesis --episodes 10 --step-s 5 --no-models")
+def thesis(
+    episodes: Episodes = 50,
+    out: Out = Path("reports/thesis"),
+    step_s: Annotated[
+        float, typer.Option(min=0.1, max=60.0, help="Time step, s; a coarse step gives a quick look.")
+    ] = 1.0,
+    claims: Annotated[bool, typer.Option(help="Test the thesis's claims.")] = True,
+    models: Annotated[bool, typer.Option(help="Compare the linear models with the nonlinear truth.")] = True,
+    processes: Processes = PROCESSES,
+) -> None:
+    """Reproduce the source thesis: figures, claims and models, with one HTML page."""
+
+    def write() -> Path:
+        from baselines.thesis.write_thesis import ThesisOptions, write_thesis
+
+        options = ThesisOptions(episodes=episodes, step_s=step_s, claims=claims, models=models)
+        return write_thesis(out, options, command_line(NAME), processes)
+
+    write_report_page(out, False, write)

@@ -1,20 +1,45 @@
-"""Files that are either complete or not there."""
+"""Reading of regular files only, and writing of files that are either complete or not there."""
 
 import contextlib
+import errno
 import os
+import stat
 import tempfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 
-@contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary path to write to; it takes the place of `path` at the end, if nothing went wrong.
-
-    Whatever goes wrong, an interrupt too, leaves the old file as it was and no temporary behind.
+def read_regular_file(path: Path, max_bytes: int) -> bytes:
+    """Read a regular file of bounded size; a pipe or a device is refused without waiting for it.
 
     Args:
-        path: the file to replace; its folder must exist. The temporary has the same ending.
+        path: the file, or a link to it.
+        max_bytes: largest size that is read.
+
+    Raises:
+        OSError: it cannot be read, is no regular file, or is larger.
+        ValueError: the path holds a null character.
+    """
+    mode = path.stat().st_mode
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "not a regular file", str(path))
+    with path.open("rb") as file:
+        content = file.read(max_bytes + 1)
+    if len(content) > max_bytes:
+        raise OSError(errno.EFBIG, f"larger than {max_bytes:,} bytes", str(path))
+    return content
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield a temporary path to write to, which replaces `path` if the block ends without an exception.
+
+    After an exception, an interrupt included, the old file is unchanged and the temporary file removed.
+
+    Args:
+        path: the file to replace; its folder must exist. The temporary file has the same suffix.
 
     Raises:
         OSError: the folder cannot be written.
@@ -31,17 +56,17 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def _mask() -> int:
-    """The permissions that a new file does not get."""
+    """Permission bits that the process withholds from new files."""
     mask = os.umask(0)
     os.umask(mask)
     return mask
 
 
 def write_texts(folder: Path, texts: Mapping[str, str]) -> None:
-    """Write text files into a folder, and rename them to their names only when all are complete.
+    """Write UTF-8 text files into a folder, each under its name only when all are complete.
 
     Args:
-        folder: made if it does not exist.
+        folder: created if it does not exist.
         texts: file name -> content.
 
     Raises:
@@ -51,10 +76,10 @@ def write_texts(folder: Path, texts: Mapping[str, str]) -> None:
 
 
 def write_files(folder: Path, contents: Mapping[str, bytes]) -> None:
-    """The same for files of any kind.
+    """Write binary files into a folder, each under its name only when all are complete.
 
     Args:
-        folder: made if it does not exist.
+        folder: created if it does not exist.
         contents: file name -> content.
 
     Raises:

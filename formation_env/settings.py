@@ -5,18 +5,39 @@ keys and wrong types are refused, and numbers are never read out of strings.
 """
 
 import difflib
-import json
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, MutableMapping
+from dataclasses import dataclass, is_dataclass
 from dataclasses import fields as dataclass_fields
-from functools import partial
-from pathlib import Path
+from functools import partial, wraps
 from typing import Annotated, Any, Final, TypeVar, cast, dataclass_transform, overload
 
 import pydantic
-from pydantic import AllowInfNan, ConfigDict, Field, GetCoreSchemaHandler, Strict
+from pydantic import AllowInfNan, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler, Strict
 from pydantic.dataclasses import dataclass as pydantic_dataclass
+from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import ArgsKwargs, CoreSchema, ErrorDetails, PydanticCustomError, core_schema
+
+from formation_env.config_files import ConfigError, load_json, load_yaml
+from formation_env.docstrings import describe_keys
+from formation_env.short_values import MAX_VALUE_LENGTH, shortened
+
+__all__ = [
+    "ConfigError",
+    "Flag",
+    "NonNegative",
+    "OneOf",
+    "Positive",
+    "Probability",
+    "Real",
+    "Text",
+    "build",
+    "faults_of",
+    "load_json",
+    "load_yaml",
+    "nearest",
+    "register",
+    "settings",
+]
 
 T = TypeVar("T")
 
@@ -28,16 +49,15 @@ Probability = Annotated[Real, Field(ge=0, le=1)]
 Flag = Annotated[bool, Strict()]
 Text = Annotated[str, Strict()]
 
-# What pydantic says of Python objects, in a YAML author's words.
+MAX_FAULT_LINES: Final = 20
+"""Faults that an error names one by one; a reader mends the first ones first."""
+
+# Pydantic's messages about Python objects, in a YAML author's words.
 _PLAIN_WORDS: Final = {
     "missing": "required but missing",
     "dataclass_type": "must be a mapping",
     "tuple_type": "must be a list",
 }
-
-
-class ConfigError(ValueError):
-    """A settings file or object is wrong; the message is one line that names file, key and value."""
 
 
 @overload
@@ -62,49 +82,94 @@ def settings(cls: type[T] | None = None, *, renamed: Mapping[str, str] | None = 
 
 
 def _make_settings(cls: type[T], renamed: Mapping[str, str]) -> type[T]:
-    """Add the validation of keys, and make the dataclass."""
+    """Make the dataclass, with the validation of keys, and errors in a line per fault."""
 
     def refuse_unknown_keys(owner: type, data: Any) -> Any:
         given = data.kwargs if isinstance(data, ArgsKwargs) else data
         known = [field.name for field in dataclass_fields(owner)]
         for key in given if isinstance(given, Mapping) else ():
             if key not in known:
+                name = str(key)[:MAX_VALUE_LENGTH]
                 if key in renamed:
-                    raise PydanticCustomError("renamed_key", "now {new}", {"key": str(key), "new": renamed[key]})
-                hint = nearest(str(key), known)
-                raise PydanticCustomError("unknown_key", "unknown key; {hint}", {"key": str(key), "hint": hint})
+                    raise PydanticCustomError("renamed_key", "now {new}", {"key": name, "new": renamed[key]})
+                raise PydanticCustomError(
+                    "unknown_key", "unknown key; {hint}", {"key": name, "hint": nearest(name, known)}
+                )
         return data
 
     validator = pydantic.model_validator(mode="before")(classmethod(refuse_unknown_keys))  # type: ignore[arg-type]
     cls.refuse_unknown_keys = validator  # type: ignore[attr-defined]
-    return cast(type[T], pydantic_dataclass(cls, frozen=True, kw_only=True, config=ConfigDict(extra="forbid")))
+    config = ConfigDict(extra="forbid", json_schema_extra=describe_keys)
+    made = pydantic_dataclass(cls, frozen=True, kw_only=True, config=config)
+    validate = made.__init__
+
+    @wraps(validate)
+    def init(self: Any, *args: Any, **kwargs: Any) -> None:
+        try:
+            validate(self, *args, **kwargs)
+        except pydantic.ValidationError as error:
+            raise _one_line_per_fault(error, type(self).__name__) from None
+
+    made.__init__ = init  # type: ignore[method-assign]
+    return cast(type[T], made)
 
 
 @dataclass(frozen=True)
 class OneOf:
-    """Annotation of a field that holds one of a registry's classes, chosen by its `kind` key."""
+    """Annotation of a field that holds an instance of the annotated class.
+
+    A mapping becomes an instance of the registry's class that its `kind` key names; the registry is read at each
+    validation, so that classes may be registered later. A hashable instance passes as it is, registered or not.
+    """
 
     registry: Mapping[str, type]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Build the tagged union that pydantic validates against."""
-        choices = {kind: handler.generate_schema(cls) for kind, cls in self.registry.items()}
-        union = core_schema.tagged_union_schema(choices, discriminator="kind")
-        return core_schema.no_info_before_validator_function(self._refuse_unknown_kind, union)
+        """Build the schema that pydantic validates against."""
+        return core_schema.no_info_plain_validator_function(partial(self._validate, source))
 
-    def _refuse_unknown_kind(self, data: Any) -> Any:
-        """Check the `kind` key before pydantic does, to say which kinds there are."""
-        known = ", ".join(sorted(self.registry))
-        kind = data.get("kind") if isinstance(data, Mapping) else getattr(data, "kind", None)
-        if kind in list(self.registry):
+    def __get_pydantic_json_schema__(self, _: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
+        """Describe the registry's classes of this moment."""
+        choices = {kind: cls.__pydantic_core_schema__ for kind, cls in self.registry.items()}  # type: ignore[attr-defined]
+        return handler(core_schema.tagged_union_schema(choices, discriminator="kind"))
+
+    def _validate(self, base: Any, data: Any) -> Any:
+        """Make an instance of `base` out of a mapping with a known `kind`, or pass one."""
+        if isinstance(data, base):
+            if type(data).__hash__ is None:
+                raise PydanticCustomError("unhashable", "must be hashable, such as an instance made with @settings")
             return data
+        known = ", ".join(sorted(self.registry))
         if not isinstance(data, Mapping):
             raise PydanticCustomError("mapping_type", "must be a mapping with a kind ({known})", {"known": known})
-        if kind is None:
+        if "kind" not in data:
             raise PydanticCustomError("missing_kind", "missing; known: {known}", {"key": "kind", "known": known})
-        hint = nearest(str(kind), self.registry)
-        context = {"key": "kind", "kind": repr(kind), "hint": hint}
+        kind = data["kind"]
+        if isinstance(kind, str) and kind in self.registry:
+            return pydantic.TypeAdapter(self.registry[kind]).validate_python(data)
+        context = {"key": "kind", "kind": shortened(kind), "hint": nearest(str(kind)[:80], self.registry)}
         raise PydanticCustomError("unknown_kind", "unknown kind {kind}; {hint}", context)
+
+
+def register(registry: MutableMapping[str, Any], cls: type, base: type) -> None:
+    """Add a settings class to a registry under its `kind`, so that files and mappings may name it.
+
+    Args:
+        registry: kind -> class.
+        cls: a class made with `settings`, whose field `kind` has its name as the default.
+        base: what it must inherit from.
+
+    Raises:
+        ValueError: it is no such class, or its kind is taken by another; one line.
+    """
+    if not (isinstance(cls, type) and issubclass(cls, base)):
+        raise ValueError(f"{getattr(cls, '__name__', cls)}: must inherit from {base.__name__}")
+    kinds = [field.default for field in dataclass_fields(cls) if field.name == "kind"] if is_dataclass(cls) else []
+    if len(kinds) != 1 or not isinstance(kinds[0], str) or not hasattr(cls, "__pydantic_validator__"):
+        raise ValueError(f'{cls.__name__}: must be made with @settings and have a field kind: Literal["x"] = "x"')
+    taken = registry.setdefault(kinds[0], cls)
+    if taken is not cls:
+        raise ValueError(f"{cls.__name__}: kind {kinds[0]!r} is taken by {taken.__module__}.{taken.__qualname__}")
 
 
 def build(cls: type[T], data: Any, where: str) -> T:
@@ -121,18 +186,28 @@ def build(cls: type[T], data: Any, where: str) -> T:
     try:
         return pydantic.TypeAdapter(cls).validate_python(data)
     except pydantic.ValidationError as error:
-        raise ConfigError("\n".join(f"{where}: {fault}" for fault in faults(error, data))) from None
+        raise _one_line_per_fault(error, where) from None
 
 
-def faults(error: pydantic.ValidationError, data: Any = None) -> list[str]:
-    """One line for each fault that pydantic found in plain data, or in what was built in Python (then without data)."""
-    return [_describe(fault, data) for fault in error.errors()]
+def _one_line_per_fault(error: pydantic.ValidationError, where: str) -> ConfigError:
+    """The error of a file or class, a line per fault, at most MAX_FAULT_LINES of them."""
+    found = error.errors(include_url=False)
+    lines = [_describe(fault) for fault in found[:MAX_FAULT_LINES]]
+    if len(found) > MAX_FAULT_LINES:
+        lines.append(f"and {len(found) - MAX_FAULT_LINES} more faults")
+    return ConfigError("\n".join(f"{where}: {line}" for line in lines))
 
 
-def _describe(fault: ErrorDetails, data: Any) -> str:
+def faults_of(error: ConfigError) -> str:
+    """Faults of an error that `build` or a constructor raised, in one line without the file or class."""
+    return "; ".join(line.partition(": ")[2] for line in str(error).splitlines())
+
+
+def _describe(fault: ErrorDetails) -> str:
     """One line for one fault: the dotted path of the key, what is wrong, what was given."""
     context = fault.get("ctx", {})
-    path = _path((*fault["loc"], context["key"]) if "key" in context else fault["loc"], data)
+    keys = (*fault["loc"], context["key"]) if "key" in context else fault["loc"]
+    path = ".".join(str(key)[:MAX_VALUE_LENGTH] for key in keys) or "(top level)"
     message = _PLAIN_WORDS.get(fault["type"], fault["msg"])
     message = message.removeprefix("Value error, ").replace("Input should", "must", 1)
     if fault["type"] == "value_error" and not fault["loc"]:
@@ -140,61 +215,7 @@ def _describe(fault: ErrorDetails, data: Any) -> str:
     if fault["type"] in ("unknown_key", "renamed_key", "missing_kind", "unknown_kind", "value_error", "missing"):
         return f"{path}: {message}"
     given = fault["input"]
-    if isinstance(given, str):
-        return f"{path}: {message}, got the string {given[:80]!r}"
-    return f"{path}: {message}, got {str(given)[:80]}"
-
-
-def _path(loc: Iterable[str | int], data: Any) -> str:
-    """Dotted path of a fault, without the tags that pydantic puts in for unions."""
-    parts: list[str] = []
-    tagged: Any = None
-    loc = [*loc] or ["(top level)"]
-    for depth, part in enumerate(loc, start=1):
-        if isinstance(data, Mapping) and data.get("kind") == part and data is not tagged:
-            tagged = data
-            continue
-        try:
-            data = data[part]
-        except (KeyError, IndexError, TypeError):
-            if depth < len(loc):
-                continue
-        parts.append(str(part))
-    return ".".join(parts)
-
-
-def load_yaml(path: Path) -> Any:
-    """Read one YAML 1.2 file; so `1e-3` is a number, and a repeated key is an error.
-
-    Raises:
-        ConfigError: the file is missing, unreadable, or no YAML.
-    """
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import MarkedYAMLError, YAMLError
-
-    try:
-        return YAML(typ="safe", pure=True).load(path)
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
-    except MarkedYAMLError as error:
-        line = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
-        raise ConfigError(f"{path}: {line}no valid YAML: {error.problem}") from None
-    except (YAMLError, ValueError) as error:  # ValueError: not UTF-8, or a date that does not exist
-        raise ConfigError(f"{path}: no valid YAML: {' '.join(str(error).split())}") from None
-
-
-def load_json(path: Path) -> Any:
-    """Read one JSON file.
-
-    Raises:
-        ConfigError: the file is missing, unreadable, or no JSON.
-    """
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be read: {error.strerror}") from None
-    except ValueError as error:
-        raise ConfigError(f"{path}: no valid JSON: {error}") from None
+    return f"{path}: {message}, got {'the string ' if isinstance(given, str) else ''}{shortened(given)}"
 
 
 def nearest(name: str, known: Iterable[str]) -> str:

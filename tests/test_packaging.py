@@ -1,8 +1,10 @@
 """The wheel carries all that a user far from the checkout needs."""
 
+import configparser
 import shutil
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -65,3 +67,92 @@ def test_scenarios_load_from_the_unpacked_wheel(wheel: Path, tmp_path: Path) -> 
     )
     assert run.returncode == 0, run.stderr
     assert int(run.stdout) == len(list((ROOT / "configs" / "scenarios").glob("*.yaml")))
+
+
+@pytest.fixture(scope="module")
+def installed(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the wheel's content, as an installer leaves it."""
+    site = tmp_path_factory.mktemp("site")
+    zipfile.ZipFile(wheel).extractall(site)
+    return site
+
+
+def run_installed(site: Path, cwd: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the program of the wheel's entry point, far from the checkout."""
+    entry = "from formation_env.__main__ import main; main()"
+    return subprocess.run(
+        [sys.executable, "-P", "-c", entry, *arguments],
+        cwd=cwd,
+        env={"PYTHONPATH": str(site), "PATH": "", "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+
+
+def test_the_wheel_has_one_program_and_its_groups(installed: Path, tmp_path: Path) -> None:
+    """`formation-env` is the only script; its groups are found through the wheel's metadata."""
+    (info,) = installed.glob("*.dist-info")
+    points = configparser.ConfigParser()
+    points.read(info / "entry_points.txt")
+    assert dict(points["console_scripts"]) == {"formation-env": "formation_env.__main__:main"}
+    assert set(points["formation_env.commands"]) == {"baselines", "agents"}
+    listed = run_installed(installed, tmp_path, "baselines", "list")
+    assert listed.returncode == 0, listed.stderr
+    assert "lqr_nominal" in listed.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (
+            ["baselines", "tune", "keeping"],
+            "tune: keeping: its settings belong to the installed package; give --out FOLDER",
+        ),
+        (
+            ["agents", "export", "runs/a"],
+            "export: the shipped policies belong to the installed package; give --out FOLDER",
+        ),
+    ],
+)
+def test_the_installed_package_is_not_written(
+    installed: Path, tmp_path: Path, arguments: list[str], fault: str
+) -> None:
+    """From a wheel what comes with the package stays as it was installed."""
+    before = {path: path.stat().st_mtime_ns for path in installed.rglob("*") if path.suffix in (".yaml", ".json")}
+    found = run_installed(installed, tmp_path, *arguments)
+    assert (found.returncode, found.stderr) == (2, f"error: {fault}\n")
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_overwritten_package_is_named(wheel: Path, tmp_path: Path) -> None:
+    """`pip install openai-agents` replaces agents/__init__.py, and its removal deletes that file: one line each."""
+    site = tmp_path / "site"
+    zipfile.ZipFile(wheel).extractall(site)
+    info = site / "openai_agents-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.3\nName: openai-agents\nVersion: 1.0\n")
+    (info / "RECORD").write_text("agents/__init__.py,,\n")
+    (site / "agents" / "__init__.py").write_text("raise SystemExit('ran')\n")
+    found = run_installed(site, tmp_path, "agents", "report")
+    told = "the name 'agents' is taken by openai-agents; install formation-env in an environment of its own"
+    assert (found.returncode, found.stderr) == (2, f"error: {told}\n")
+    (site / "agents" / "__init__.py").unlink()
+    shutil.rmtree(info)
+    found = run_installed(site, tmp_path, "agents", "report")
+    assert found.returncode == 2
+    missing = site / "agents" / "__init__.py"
+    told = f"{missing}: missing, perhaps removed with another package; install formation-env again"
+    assert found.stderr == f"error: {told}\n"
+    assert run_installed(site, tmp_path, "env", "list").returncode == 0
+
+
+def test_lower_bounds_are_those_that_were_tried() -> None:
+    """Typer before 0.26 warns under today's Click, matplotlib before 3.10.7 under today's pyparsing, and so on."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    bounds = dict(each.split(">=") for each in project["dependencies"])
+    least = {"typer": (0, 26), "matplotlib": (3, 10, 7), "pandas": (2, 2, 2), "control": (0, 10, 1)}
+    for name, version in least.items():
+        assert tuple(map(int, bounds[name].split("."))) >= version, name

@@ -1,9 +1,9 @@
-"""PPO in one file, in the manner of CleanRL, on the batched environment: torch, no Stable-Baselines3.
+"""PPO in one file in the style of CleanRL, on the batched environment: torch, no Stable-Baselines3.
 
     python -m agents.examples.ppo FormationKeeping-v0 --steps 2000000
 
-Proximal policy optimisation (Schulman et al. 2017) with generalised advantages (Schulman et al. 2016). All rows are
-stepped by one call. Rows that end begin anew in the same step; their last observation is in `infos["final_obs"]`.
+Proximal policy optimisation (Schulman et al. 2017) with generalised advantages (Schulman et al. 2016). One call steps
+all rows. Rows whose episode ends restart in the same step; their last observation is in `infos["final_obs"]`.
 """
 
 from collections.abc import Iterator
@@ -18,18 +18,28 @@ from torch import Tensor, nn
 from torch.distributions import Normal
 
 import formation_env  # noqa: F401 (registers the environments)
+from agents.policy.actor import ACTIONS
 from agents.policy.throttle import throttle
 from formation_env.evaluation.rollout import evaluate
 from formation_env.evaluation.seeds import seeds
+from formation_env.task.observation import SIZE
 
 app = typer.Typer(add_completion=False)
-ROWS, LENGTH, BATCH, EPOCHS = 128, 128, 512, 5
+ROWS, LENGTH = 128, 128
+"""Environments side by side, and steps of each between updates."""
+BATCH, EPOCHS = 512, 5
+"""Samples of a gradient step (larger batches learn more slowly per step), and passes over each rollout."""
 GAMMA, LAMBDA, CLIP, VALUE_WEIGHT, MAX_GRADIENT = 0.995, 0.95, 0.2, 0.5, 0.5
-LEARNING_RATE, REWARD_SCALE, POWER = 7e-4, 3.0, 3.0
+"""Discount (200 steps ahead), and the usual values of Schulman et al. 2017 and CleanRL."""
+LEARNING_RATE = 7e-4
+REWARD_SCALE, POWER = 3.0, 3.0
+"""Returns become of order 1; p of the thrust sign(z) |z|^p for a throttle z."""
+VALIDATION_EPISODES = 64
+VALIDATIONS = 20
 
 
 class Agent(nn.Module):
-    """Mean and deviation of the throttles, and the value of what is seen."""
+    """Mean and standard deviation of the throttles, and the value of an observation."""
 
     def __init__(self, size: int, actions: int) -> None:
         super().__init__()
@@ -37,18 +47,19 @@ class Agent(nn.Module):
         self.log_std = nn.Parameter(torch.full((actions,), -1.0))
 
     def distribution(self, observations: Tensor) -> Normal:
-        """Of the throttles (..., 3)."""
+        """Distribution of the throttles (..., 3)."""
         return Normal(self.actor(observations), self.log_std.exp())
 
     def value(self, observations: Tensor) -> Tensor:
         """Expected discounted rewards (...)."""
-        return self.critic(observations).squeeze(-1)
+        values: Tensor = self.critic(observations).squeeze(-1)
+        return values
 
     @torch.no_grad()
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Any, Any]:
-        """Thrusts without exploration, as `evaluate` and the report ask for them."""
+        """Thrusts without exploration, in the form that `evaluate` and the report call."""
         z = self.actor(torch.as_tensor(observation)).clamp(-1, 1)
         return throttle(z.numpy(), POWER), state
 
@@ -63,7 +74,7 @@ def _network(inputs: int, outputs: int, last_gain: float) -> nn.Sequential:
 
 @dataclass(frozen=True)
 class Rollout:
-    """What was flown: tensors (LENGTH, ROWS, ...)."""
+    """Transitions of a rollout: tensors (LENGTH, ROWS, ...)."""
 
     observations: Tensor
     throttles: Tensor
@@ -74,21 +85,21 @@ class Rollout:
 
 @torch.no_grad()
 def fly(env: gymnasium.vector.VectorEnv, agent: Agent, observations: Any) -> tuple[Rollout, Any]:
-    """Fly LENGTH steps in all rows; what was flown, and the observations (ROWS, SIZE) to go on from."""
+    """Fly LENGTH steps in all rows; return the rollout and the last observations (ROWS, SIZE)."""
     steps = []
     for _ in range(LENGTH):
         seen = torch.as_tensor(observations)
         distribution = agent.distribution(seen)
-        z = distribution.sample()
+        z = distribution.sample()  # type: ignore[no-untyped-call] # torch.distributions has no types
         observations, rewards, terminations, truncations, infos = env.step(throttle(z.clamp(-1, 1).numpy(), POWER))
         ended = terminations | truncations
         next_seen = torch.as_tensor(observations).clone()
         for row in np.flatnonzero(ended):
             next_seen[row] = torch.as_tensor(infos["final_obs"][row])
-        # the formation goes on after a truncation, so what comes then counts; a termination has been paid for
+        # After a truncation the formation flies on, so its value counts; a termination is already penalised.
         next_values = agent.value(next_seen) * torch.as_tensor(~terminations)
         rewards = torch.as_tensor(REWARD_SCALE * rewards, dtype=torch.float32)
-        log_probs = distribution.log_prob(z).sum(-1)
+        log_probs = distribution.log_prob(z).sum(-1)  # type: ignore[no-untyped-call]
         steps.append((seen, z, log_probs, rewards, agent.value(seen), next_values, torch.as_tensor(ended)))
     seen, z, log_probs, rewards, values, next_values, ended = map(torch.stack, zip(*steps, strict=True))
     advantages = advantages_of(rewards, values, next_values, ended)
@@ -109,18 +120,19 @@ def advantages_of(rewards: Tensor, values: Tensor, next_values: Tensor, ended: T
 
 
 def batches(rollout: Rollout) -> Iterator[tuple[Tensor, ...]]:
-    """EPOCHS times all steps in random order, BATCH at a time."""
+    """Yield batches of all steps in random order, EPOCHS times."""
     parts = (rollout.observations, rollout.throttles, rollout.log_probs, rollout.advantages, rollout.returns)
     flat = [part.flatten(0, 1) for part in parts]
     for _ in range(EPOCHS):
-        for chosen in torch.randperm(len(flat[0])).split(BATCH):
+        for chosen in torch.split(torch.randperm(len(flat[0])), BATCH):
             yield tuple(part[chosen] for part in flat)
 
 
 def learn(agent: Agent, optimizer: torch.optim.Optimizer, rollout: Rollout) -> None:
-    """Improve the agent by what was flown."""
+    """Update the agent on a rollout."""
     for observations, throttles, log_probs, advantages, returns in batches(rollout):
-        ratio = (agent.distribution(observations).log_prob(throttles).sum(-1) - log_probs).exp()
+        new_log_probs = agent.distribution(observations).log_prob(throttles)  # type: ignore[no-untyped-call]
+        ratio = (new_log_probs.sum(-1) - log_probs).exp()
         advantages = (advantages - advantages.mean()) / (advantages.std() + 1e-8)
         actor_loss = -torch.min(ratio * advantages, ratio.clamp(1 - CLIP, 1 + CLIP) * advantages).mean()
         value_loss = (agent.value(observations) - returns).square().mean()
@@ -131,12 +143,12 @@ def learn(agent: Agent, optimizer: torch.optim.Optimizer, rollout: Rollout) -> N
 
 
 def train(env_id: str, steps: int, seed: int, reports: int) -> tuple[Agent, list[float]]:
-    """Train an agent; the mean costs, m/s, on the validation seeds before, on the way and at the end."""
+    """Train an agent; return it and its mean costs on the validation seeds, before, during and after training, m/s."""
     torch.manual_seed(seed)
-    torch.set_num_threads(1)  # more only wait for each other on networks so small
+    torch.set_num_threads(1)  # more threads only wait for each other in networks this small
     env = gymnasium.make_vec(env_id, ROWS, vectorization_mode="vector_entry_point")
     observations, _ = env.reset(seed=seeds("training", (seed + 1) * ROWS)[-ROWS])
-    agent = Agent(env.single_observation_space.shape[0], env.single_action_space.shape[0])
+    agent = Agent(SIZE, ACTIONS)
     optimizer = torch.optim.Adam(agent.parameters(), LEARNING_RATE, eps=1e-5)
     costs, updates = [_cost(agent, env_id)], max(1, steps // (ROWS * LENGTH))
     for update in range(1, updates + 1):
@@ -150,7 +162,7 @@ def train(env_id: str, steps: int, seed: int, reports: int) -> tuple[Agent, list
 
 
 def _cost(agent: Agent, env_id: str) -> float:
-    return -float(evaluate(agent, env_id, seeds("validation", 64))["return"].mean())
+    return -float(evaluate(agent, env_id, seeds("validation", VALIDATION_EPISODES))["return"].mean())
 
 
 @app.command()
@@ -158,9 +170,9 @@ def main(
     env_id: Annotated[str, typer.Argument(help="A registered id.")] = "FormationKeeping-v0",
     steps: Annotated[int, typer.Option(min=1, help="Environment steps.")] = 2_000_000,
     seed: Annotated[int, typer.Option(min=0)] = 0,
-    reports: Annotated[int, typer.Option(min=1, help="Evaluations on the way.")] = 20,
+    reports: Annotated[int, typer.Option(min=1, help="Number of evaluations during training.")] = VALIDATIONS,
 ) -> None:
-    """Train PPO, and say what it costs on validation seeds."""
+    """Train PPO and print its cost on validation seeds."""
     train(env_id, steps, seed, reports)
 
 

@@ -1,9 +1,9 @@
-"""Gymnasium's own training loop: a linear policy finds its gains by random search, an episode at a time.
+"""Gymnasium's own loop: random search of a linear policy's gains, one episode at a time.
 
     python -m agents.examples.random_search FormationKeeping-v0 --tries 300
 
-Each try changes the best gains at random, with a width that grows when that helps and shrinks when it does not (the
-(1+1) evolution strategy with the one-fifth rule, Rechenberg 1973). All tries fly the same few training seeds.
+Each try perturbs the best gains at random; the step size grows after a success and shrinks after a failure (the (1+1)
+evolution strategy with the one-fifth rule, Rechenberg 1973). All tries fly the same few training seeds.
 """
 
 from typing import Annotated
@@ -20,8 +20,15 @@ from formation_env.task.observation import SLICES
 
 app = typer.Typer(add_completion=False)
 Env = gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]
-SEEN = SLICES["error_log"]
-"""The policy looks at the compressed error alone: three positions, three velocities."""
+INPUT = SLICES["error_log"]
+"""The policy reads the compressed error alone: three positions, three velocities."""
+POWER = 3.0
+"""p of the thrust sign(z) |z|^p for the policy's output z."""
+INITIAL_WIDTH = 0.3
+"""First standard deviation of the changes: inputs and outputs are of order 1."""
+GROWTH, SHRINKAGE = 0.2, -0.05
+"""Logarithmic change of that after a success and after a failure: in balance if every fifth try succeeds."""
+VALIDATION_EPISODES = 10
 
 
 def fly(env: Env, gains: NDArray[np.float64], seed: int) -> float:
@@ -29,8 +36,8 @@ def fly(env: Env, gains: NDArray[np.float64], seed: int) -> float:
     observation, _ = env.reset(seed=seed)
     total, ended = 0.0, False
     while not ended:
-        z = np.clip(gains @ observation[SEEN], -1, 1)
-        observation, reward, terminated, truncated, _ = env.step(throttle(z, 3.0))
+        z = np.clip(gains @ observation[INPUT], -1, 1)
+        observation, reward, terminated, truncated, _ = env.step(throttle(z, POWER))
         total += float(reward)
         ended = terminated or truncated
     return total
@@ -46,24 +53,25 @@ def search(env_id: str, tries: int, episodes: int, seed: int) -> tuple[NDArray[n
         seed: of the search.
 
     Returns:
-        The best gains (3, 6), and the mean costs on the validation seeds of no gains and of these, m/s.
+        Best gains (3, 6), and the mean costs of zero gains and of these on the validation seeds, m/s.
     """
     env: Env = gymnasium.make(env_id)
     rng = np.random.default_rng(seed)
-    training, validation = seeds("training", episodes), seeds("validation", 10)
+    training, validation = seeds("training", episodes), seeds("validation", VALIDATION_EPISODES)
 
     def cost(gains: NDArray[np.float64], flown: range) -> float:
         return -float(np.mean([fly(env, gains, one) for one in flown]))
 
-    best, width = np.zeros((3, 6)), 0.3
+    best, width = np.zeros((3, 6)), INITIAL_WIDTH
     least = before = cost(best, training)
     for number in range(1, tries + 1):
         gains = best + width * rng.normal(size=best.shape)
-        found = cost(gains, training)
-        if found < least:
-            best, least = gains, found
+        tried = cost(gains, training)
+        success = tried <= least
+        if tried < least:
+            best, least = gains, tried
             typer.echo(f"try {number}: costs {least:.3f} m/s, without gains {before:.3f}")
-        width *= np.exp(0.2 if found <= least else -0.05)
+        width *= np.exp(GROWTH if success else SHRINKAGE)
     return best, cost(np.zeros_like(best), validation), cost(best, validation)
 
 
@@ -74,7 +82,7 @@ def main(
     episodes: Annotated[int, typer.Option(min=1, help="Training seeds of each try.")] = 4,
     seed: Annotated[int, typer.Option(min=0)] = 0,
 ) -> None:
-    """Search, and say what came of it on seeds that the search has not seen."""
+    """Search gains, and print their cost on seeds that the search has not seen."""
     gains, before, after = search(env_id, tries, episodes, seed)
     typer.echo(f"gains:\n{gains.round(3)}\nmean cost on validation seeds: {after:.3f} m/s, without gains {before:.3f}")
 

@@ -1,6 +1,5 @@
 """Pretraining of an actor: imitation of a classical policy, then gradient descent through the model."""
 
-import copy
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -63,29 +62,50 @@ def pretrain(
         ConfigError: no teacher of that name, or `check_pretraining` fails.
     """
     check_pretraining(settings, scenario, seed)
-    generator, power = np.random.default_rng(seed), functions.throttle_power
-    net = _network(network, seed)
+    generator, net = np.random.default_rng(seed), _network(network, seed)
+    best = _BestNetwork(net, functions, scenario, validation_episodes, progress)
     episodes = _training_seeds(settings, seed)
-    best, lowest = copy.deepcopy(net), math.inf
-
-    def validate(stage: str) -> None:
-        nonlocal best, lowest
-        actor = _actor(net, functions, scenario)
-        cost = -float(evaluate(actor, scenario, seeds("validation", validation_episodes))["return"].mean())
-        progress(stage, cost)
-        if cost < lowest:
-            best, lowest = copy.deepcopy(net), cost
-
     recorded = episodes[settings.rows * settings.rounds :]
     models = _models(settings, functions, scenario, recorded) if settings.updates else []
     if settings.rounds:
-        teacher = make_policy(settings.teacher, scenario)
+        lesson = Lesson(
+            make_policy(settings.teacher, scenario), scenario, functions.throttle_power, functions.magnification
+        )
         rounds = [episodes[settings.rows * i : settings.rows * (i + 1)] for i in range(settings.rounds)]
-        imitate(net, Lesson(teacher, scenario, power, functions.magnification), rounds, generator)
-        validate(f"after imitating {settings.teacher}")
+        imitate(net, lesson, rounds, generator)
+        best.validate(f"after imitating {settings.teacher}")
     if models:
-        descend(net, power, models, settings, generator, validate)
-    return _actor(best, functions, scenario)
+        descend(net, functions.throttle_power, models, settings, generator, best.validate)
+    return best.actor
+
+
+class _BestNetwork:
+    """Best state on the validation seeds of a network in training.
+
+    Attributes:
+        actor: that state, without torch; the initial one before the first validation.
+    """
+
+    def __init__(
+        self,
+        net: nn.Sequential,
+        functions: Functions,
+        scenario: Scenario,
+        episodes: int,
+        progress: Callable[[str, float], Any],
+    ) -> None:
+        self._net, self._functions, self._scenario, self._progress = net, functions, scenario, progress
+        self._seeds = seeds("validation", episodes)
+        self._lowest_cost = math.inf
+        self.actor = _actor(net, functions, scenario)
+
+    def validate(self, stage: str) -> None:
+        """Fly the network in its present state, and keep it if its cost is the lowest so far."""
+        actor = _actor(self._net, self._functions, self._scenario)
+        cost = -float(evaluate(actor, self._scenario, self._seeds)["return"].mean())
+        self._progress(stage, cost)
+        if cost < self._lowest_cost:
+            self.actor, self._lowest_cost = actor, cost
 
 
 def check_pretraining(settings: Pretraining, scenario: Scenario, seed: int) -> None:

@@ -128,22 +128,27 @@ def _saved(folder: Path, run: Run, episodes: pd.DataFrame) -> Interval | None:
 
 def _cost(episodes: pd.DataFrame) -> Interval:
     """Mean cost with its interval, minus the return."""
-    mean, low, high = (float(value) for value in summarise(episodes).loc["return", ["mean", "low", "high"]])
-    return Interval(mean=-mean, low=-high, high=-low)
+    returned = _intervals(episodes)["return"]
+    return Interval(mean=-returned.mean, low=-returned.high, high=-returned.low)
+
+
+def _intervals(episodes: pd.DataFrame) -> dict[str, Interval]:
+    """Mean and interval of each metric."""
+    return {
+        str(name): Interval(mean=float(row["mean"]), low=float(row["low"]), high=float(row["high"]))
+        for name, row in summarise(episodes).iterrows()
+    }
 
 
 def _card(candidates: Sequence[Candidate], tensors: bytes) -> Card:
     best = candidates[0]
-    summary = summarise(best.episodes)[["mean", "low", "high"]]
     training = {key: value for key, value in asdict(best.run).items() if key not in ("algorithm", "env", "scenario")}
     return Card(
         algorithm=best.run.algorithm,
         env=best.run.env,
         observation_size=SIZE,
         sha256=sha256(tensors),
-        test={
-            str(name): Interval(mean=row["mean"], low=row["low"], high=row["high"]) for name, row in summary.iterrows()
-        },
+        test=_intervals(best.episodes),
         test_episodes=TEST_EPISODES,
         first_test_costs_m_s=tuple(-best.episodes["return"].to_numpy(float)[:LISTED_EPISODES]),
         cost_over_runs_m_s=_over_runs([candidate.trained.test_cost_m_s.mean for candidate in candidates]),

@@ -2,11 +2,8 @@
 
 import hashlib
 import json
-import platform
-import subprocess
 from collections.abc import Mapping
 from dataclasses import asdict
-from importlib import metadata
 from pathlib import Path
 from typing import Annotated, Any, Final, Self
 
@@ -41,7 +38,6 @@ DIGEST: Final = "sha256"
 CURVE_COLUMNS: Final = ("steps", "seconds", "return")
 PRETRAINING_COLUMNS: Final = ("seconds", "return")
 """Columns that must hold finite numbers; `CURVE` has further metrics, `PRETRAINING` a text in `done`."""
-LIBRARIES: Final = ("formation-env", "gymnasium", "numpy", "stable-baselines3", "torch")
 
 
 @settings
@@ -94,31 +90,6 @@ def _digest(data: Mapping[str, Any]) -> str:
     """Hash of settings as plain data, without a hash that they contain."""
     content = {key: value for key, value in data.items() if key != DIGEST}
     return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
-
-
-def versions() -> dict[str, str]:
-    """Versions of the interpreter and of the libraries behind a model, and the git revision of a checkout."""
-    libraries = {name: metadata.version(name) for name in LIBRARIES}
-    return {"python": platform.python_version()} | libraries | {"git": _revision(Path(__file__).parents[1])}
-
-
-def _revision(package: Path) -> str:
-    """Git revision of the repository whose top folder contains the package, `-dirty` if changed; empty without one.
-
-    A package installed below some other repository, as in a virtual environment, has no revision of its own.
-    """
-    if _git(package, "rev-parse", "--show-toplevel") != str(package.parent.resolve()):
-        return ""
-    return _git(package, "describe", "--always", "--dirty", "--exclude=*", "--abbrev=40")
-
-
-def _git(folder: Path, *arguments: str) -> str:
-    """Output of a git command; empty if it fails or git is not installed."""
-    try:
-        command = ["git", "-C", str(folder), *arguments]
-        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
-    except (OSError, subprocess.CalledProcessError):
-        return ""
 
 
 def start_run(run: Run, folder: Path) -> None:

@@ -17,10 +17,10 @@ from agents.algorithms.registry import ALGORITHMS
 from agents.hyperparameters import CommonSettings
 from agents.training.run_folder import Run, read_curve, start_file
 from agents.training.train import check_run, pretrained, train
-from agents.tuning.journal import check_seal, seal
 from agents.tuning.search_space import apply, current_values, search_space
+from baselines.tuning.journal import add_trial, open_study, trials_of
 from baselines.tuning.settings_file import commented
-from baselines.tuning.study import distributions, open_study
+from baselines.tuning.study import distributions
 from formation_env.files import write_texts
 from formation_env.settings import ConfigError
 
@@ -82,16 +82,19 @@ def search(
     """
     check_run(run)
     name, journal = task_name(run), folder / JOURNAL
-    check_seal(journal)
-    study = open_study(name, journal)
+    study = open_study(identity(run), journal)
     run = _with_shared_start(run, folder / name)
-    while len(known := study.get_trials(deepcopy=False)) < trials:
-        study.add_trial(_run_trial(run, known))
-        seal(journal)
-        result = best_of(run, study.get_trials(deepcopy=False))
+    while len(known := trials_of(study)) < trials:
+        add_trial(study, _run_trial(run, known))
+        result = best_of(run, trials_of(study))
         write_texts(folder, {BEST: _to_yaml(run, result)})
         progress(result)
     return best_of(run, known[:trials])
+
+
+def identity(run: Run) -> dict[str, str | int]:
+    """What a study states in its journal."""
+    return {"algorithm": run.algorithm, "task": task_name(run)}
 
 
 def task_name(run: Run) -> str:
@@ -170,5 +173,5 @@ def _to_yaml(run: Run, result: SearchResult) -> str:
     """File of hyperparameters, with a comment on the search that gave them."""
     return commented(
         asdict(result.agent),
-        f"{run.command or 'python -m agents tune'}\n{run.env}, {run.steps} steps; {result.in_words()}",
+        f"{run.command or 'formation-env agents tune'}\n{run.env}, {run.steps} steps; {result.in_words()}",
     )

@@ -3,24 +3,25 @@
 from dataclasses import asdict
 
 from agents.hyperparameters import CommonSettings
-from baselines.tuning.knobs import Knob, read, turn
+from baselines.controllers.search_space import Parameter
+from baselines.tuning import search_space as mechanics
 from formation_env.settings import build
 
 
-def search_space(algorithm: type[CommonSettings]) -> tuple[Knob, ...]:
+def search_space(algorithm: type[CommonSettings]) -> tuple[Parameter, ...]:
     """Searched hyperparameters of an algorithm with their limits."""
     return tuple(
-        Knob((name,), limits.low, limits.high, log=limits.log) for name, limits in algorithm.search_space.items()
+        Parameter((name,), limits.low, limits.high, log=limits.log) for name, limits in algorithm.search_space.items()
     )
 
 
 def current_values(agent: CommonSettings) -> dict[str, float]:
     """Values of the searched hyperparameters by name, clipped to their limits."""
     dimensions = search_space(type(agent))
-    values = read(asdict(agent), dimensions)
+    values = mechanics.current_values(asdict(agent), dimensions)
     return {dimension.name: min(max(values[dimension.name], dimension.low), dimension.high) for dimension in dimensions}
 
 
 def apply(agent: CommonSettings, values: dict[str, float]) -> CommonSettings:
     """Hyperparameters with searched values by name, rounded to three digits."""
-    return build(type(agent), turn(asdict(agent), search_space(type(agent)), values), "tune")
+    return build(type(agent), mechanics.apply(asdict(agent), search_space(type(agent)), values), "tune")

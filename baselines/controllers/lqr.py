@@ -22,14 +22,14 @@ from formation_env.task.schedule import Leg
 
 @settings
 class TransferSettings:
-    """How a transfer is flown.
+    """Settings of the transfers.
 
     Attributes:
         horizon: `infinite`: one gain, the weights hold at every step. `finite`: a gain for each number of steps to
             arrival, the state's weights hold at the arrival only (Ma 2009, eq. 4.12-4.14).
         weights: of errors from the desired path, and of control.
-        rounds: finite horizon: how often the control's weights are renewed, towards least fuel; 0 is least energy.
-        floor: finite horizon: smallest burn that is told from none, in units of max_accel_m_s2.
+        rounds: finite horizon: reweighting rounds of the control's weights, towards least fuel; 0 is least energy.
+        floor: finite horizon: added to the burns in the reweighting, in units of max_accel_m_s2; smaller ones vanish.
     """
 
     horizon: Literal["finite", "infinite"] = "finite"

@@ -23,7 +23,7 @@ class LQRNominalSettings:
     """Settings of `lqr_nominal`.
 
     Attributes:
-        reweighted_lqg: how the feedback's gains are found.
+        reweighted_lqg: design of the feedback's gains.
     """
 
     reweighted_lqg: ReweightedLQGSettings = ReweightedLQGSettings()

@@ -1,4 +1,4 @@
-"""How the sliding mode controller comes to its surface: reaching laws, or a relay.
+"""Reaching laws and the relay, which bring the sliding mode controller to its surface.
 
 To add a law: a class with `change` here, and a line in `REACHING_LAWS`.
 """

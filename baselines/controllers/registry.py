@@ -34,8 +34,8 @@ _CLASSES: Final[tuple[type[AccelerationPolicy], ...]] = (
 )
 POLICIES: Final[dict[str, type[AccelerationPolicy]]] = {each.name: each for each in _CLASSES}
 """Classes made with (scenario, settings), the settings being of the class's `Settings`."""
-COARSE_THRUST: Final = 0.5
-"""Minimum thrust, in units of the limit, from which on a proportional policy is warned of: half its range is lost."""
+COARSE_THRUST: Final = 0.1
+"""Minimum thrust over the limit from which on proportional laws are warned of: in keeping `lqr` errs 4 times as far."""
 
 
 def register_policy(policy: type[AccelerationPolicy]) -> type[AccelerationPolicy]:
@@ -102,13 +102,13 @@ def policy_class(name: str) -> type[AccelerationPolicy]:
 
 
 def _warn_of_coarse_thrust(kind: type[AccelerationPolicy], scenario: Scenario) -> None:
-    """Warn if most thrusts that a proportional policy commands are below the thruster's minimum."""
+    """Warn if a proportional policy is made for a thruster that gives no small thrusts."""
     craft = scenario.spacecraft
     if kind.proportional and craft.min_accel_m_s2 >= COARSE_THRUST * craft.max_accel_m_s2:
         warnings.warn(
-            f"{kind.name}: commands thrust in proportion to the error, but spacecraft.min_accel_m_s2 = "
-            f"{craft.min_accel_m_s2:g} is near max_accel_m_s2 = {craft.max_accel_m_s2:g}, so small errors get none; "
-            "use mpc, deadband or two_impulse",
+            f"{kind.name}: commands thrust in proportion to the error, but the thruster gives none below "
+            f"spacecraft.min_accel_m_s2 = {craft.min_accel_m_s2:g} (max_accel_m_s2 = {craft.max_accel_m_s2:g}), so "
+            "small errors are left to grow; use deadband, two_impulse or mpc",
             UserWarning,
             stacklevel=3,
         )

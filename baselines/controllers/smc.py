@@ -43,6 +43,7 @@ class SMC(AccelerationPolicy):
         Parameter(("reaching.q_per_s",), 3e-5, 3e-2),
         Parameter(("boundary_m",), 0.1, 1e4),
     )
+    proportional = True
     color, symbol = "#D55E00", "triangle-up"
 
     def __init__(self, scenario: Scenario, settings: SMCSettings) -> None:

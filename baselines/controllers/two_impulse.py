@@ -63,6 +63,6 @@ class TwoImpulsePolicy(AccelerationPolicy):
         return self.within_limit(np.where(in_hold[..., None], hold, transfer / self.scenario.dt_s))
 
     def _braking_s(self, velocity_m_s: Array) -> Array:
-        """How long before the arrival (...) the burn against a velocity (..., 3) begins, s; at least a step."""
+        """Lead time (...) of the burn against a velocity (..., 3) before the arrival, s; at least a step."""
         burn_s = np.abs(velocity_m_s).max(axis=-1) / self._max_accel_m_s2
         return np.asarray(np.maximum(self.settings.braking * burn_s, _LEAST_BURN_STEPS * self.scenario.dt_s))

@@ -1,4 +1,4 @@
-"""Where the follower should be at each instant: the desired path, as an offset from the reference.
+"""Guidance: the desired path of each phase, as an offset from the reference.
 
 - `automatic`: the reference, even before the arrival, so the controller finds the way (Ma 2009, section 3.2.3);
 - `straight_line`: to the arrival on a straight line in LVLH at constant speed (section 3.2.2);
@@ -42,14 +42,14 @@ _PATH_THRUST_SHARE = 0.9
 _PATH_ROUNDS = 30
 """Reweighting rounds of the least-fuel path, as many as the regulators use by default."""
 _PATH_FLOOR = 1e-3
-"""Smallest burn of the least-fuel path that is told from none, in units of its limit."""
+"""Added to the burns in the reweighting of the least-fuel path, in units of its limit; smaller ones vanish."""
 _SAME_PLANE_M = 1e-3
 """Amplitude of a motion across the plane that rounding may leave, m."""
 
 
 @dataclass(frozen=True)
 class Tracking:
-    """Where the follower is, against where it should be, for observations (...).
+    """Estimated state against the desired path, for observations (...).
 
     Attributes:
         error: estimated minus desired state (..., 6), m and m/s.
@@ -65,7 +65,7 @@ class Guidance:
 
     Attributes:
         desired: states (phases, steps left, 6), m and m/s.
-        residuals: what the filter's model lacks to go along the desired path by itself over the next step, likewise.
+        residuals: desired state after the next step less the filter model's coast there, likewise.
     """
 
     def __init__(self, scenario: Scenario, guidance: GuidanceName) -> None:

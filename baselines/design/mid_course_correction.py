@@ -1,4 +1,4 @@
-"""What a thrust now does to the error at the arrival, and the impulse that takes a predicted miss away.
+"""Mid-course corrections: effect of a thrust on the error at the arrival, and the impulse that cancels a miss.
 
 Legend: Phi (6, 6) from now to the arrival, Phi_rv its block from velocities to positions.
 """
@@ -20,11 +20,11 @@ _NO_LEVERAGE_S = 1e-9
 
 @settings
 class CorrectionSettings:
-    """When a transfer's predicted miss is worth an impulse.
+    """Thresholds on a transfer's predicted miss for a corrective impulse.
 
     Attributes:
         miss_m: predicted position error at the arrival below which the follower coasts, m.
-        miss_sigmas: the same, in units of how well the filter knows that error.
+        miss_sigmas: the same threshold in units of the filter's sigma of that error.
     """
 
     miss_m: NonNegative = 10.0
@@ -45,7 +45,7 @@ class MidCourse:
         return coast
 
     def impulse(self, miss_m: Array, at: Instants) -> Array:
-        """The impulse (..., 3), m/s, that takes a predicted miss (..., 3), m, away as far as it has leverage on it."""
+        """Impulse (..., 3), m/s, that cancels a predicted miss (..., 3), m, as far as it has leverage on it."""
         impulse: Array = -(self._aim[at] @ miss_m[..., None])[..., 0]
         return impulse
 
@@ -65,7 +65,7 @@ class MidCourse:
 
 
 def sigmas(shown: Array, unit: float) -> Array:
-    """A sigma from what the observation shows of it."""
+    """Decode a sigma from its block of the observation."""
     return np.asarray(unit * 10.0 ** (SIGMA_DECADES * shown))
 
 

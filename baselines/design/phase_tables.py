@@ -15,7 +15,7 @@ Instants = tuple[NDArray[np.intp], NDArray[np.intp]]
 
 
 def read_instants(observation: NDArray[np.floating], layout: ObservationLayout, dt_s: float) -> Instants:
-    """Where observations (..., SIZE) stand on the clock.
+    """Phase and steps left of observations (..., SIZE).
 
     Args:
         observation: (..., SIZE).
@@ -30,7 +30,7 @@ def by_steps_left(scenario: Scenario, values: Callable[[Leg], NDArray[np.floatin
     """Tabulate values (phases, steps left, ...) of each instant; 0 where a phase has none.
 
     Args:
-        scenario: what is flown.
+        scenario: gives the phases.
         values: gives the values (count, ...) of a phase, from its beginning on.
     """
     plan = legs(scenario)
@@ -43,7 +43,7 @@ def by_steps_left(scenario: Scenario, values: Callable[[Leg], NDArray[np.floatin
 
 
 def nominal_start(scenario: Scenario, leg: Leg) -> Array:
-    """Where a phase should begin (6,): at the reference of the one before, or at the scenario's start."""
+    """Nominal state (6,) at a phase's beginning: the reference of the phase before, or the scenario's start."""
     if leg.index == 0:
         return scenario.start.formation.state(scenario.orbit)
     return leg_reference(scenario, legs(scenario)[leg.index - 1], np.array(leg.start))

@@ -89,7 +89,7 @@ class Spread:
 
 
 def spread(model: DiscreteModel, gains: Array, start: Array, first: Array, known: Knowledge) -> Spread:
-    """How far controls and errors scatter under u = -K e_hat.
+    """Root mean squares of controls and errors under u = -K e_hat.
 
     Args:
         model: the filter's model of each step (steps, ...).
@@ -135,11 +135,11 @@ class PhaseDesign:
 
 @settings(renamed={"price_scale": "error_weight_scale"})
 class ReweightedLQGSettings:
-    """How the regulators are found.
+    """Settings of the reweighting.
 
     Attributes:
         rounds: number of reweighting rounds after the first design.
-        floor: smallest thrust that is told from none, in units of max_accel_m_s2; it keeps all weights finite.
+        floor: added to the rms thrust in the reweighting, in units of max_accel_m_s2; it keeps all weights finite.
         error_weight_scale: factor of the scenario's error weight.
     """
 
@@ -183,11 +183,11 @@ def _design(
     for _ in range(settings.rounds + 1):
         Q, R = error_weight[:, None, None] * position, control_weight[:, None, None] * np.eye(3)
         gains, stiffness = time_varying_regulator(model.Phi, model.Gamma, Q, R)
-        seen = spread(model, gains, start, first, known)
-        overload = 1 + OVERLOAD * np.maximum(seen.peak / limit - 1, 0)
-        control_weight = np.sqrt(control_weight * scenario.dt_s * overload / (seen.control + settings.floor * limit))
-        error_weight = np.sqrt(error_weight * weight * cost.per_square(seen.error, ERROR_FLOOR_M))
-    return PhaseDesign(gains, stiffness), seen.last
+        rms = spread(model, gains, start, first, known)
+        overload = 1 + OVERLOAD * np.maximum(rms.peak / limit - 1, 0)
+        control_weight = np.sqrt(control_weight * scenario.dt_s * overload / (rms.control + settings.floor * limit))
+        error_weight = np.sqrt(error_weight * weight * cost.per_square(rms.error, ERROR_FLOOR_M))
+    return PhaseDesign(gains, stiffness), rms.last
 
 
 def error_weights(scenario: Scenario, leg: Leg) -> Array:
@@ -198,7 +198,7 @@ def error_weights(scenario: Scenario, leg: Leg) -> Array:
 
 
 def episode_scatter(scenario: Scenario) -> tuple[Array, Array]:
-    """How far an episode scatters about its mean under `reweighted_gains`.
+    """Scatter of an episode about its mean under `reweighted_gains`.
 
     Returns:
         Root mean squares of the true position error (num_steps + 1,), m, and of the acceleration (num_steps,), m/s^2.
@@ -207,6 +207,6 @@ def episode_scatter(scenario: Scenario) -> tuple[Array, Array]:
     first, error, control = known.learned[0], np.zeros(scenario.num_steps + 1), np.zeros(scenario.num_steps)
     for leg, gains in zip(legs(scenario), reweighted_gains(scenario), strict=True):
         model = scenario.filter_dynamics().steps(leg.start, leg.end)
-        seen = spread(model, gains, np.zeros(6), first, known.during(leg))
-        error[leg.start : leg.end + 1], control[leg.start : leg.end], first = seen.error, seen.control, seen.last
+        rms = spread(model, gains, np.zeros(6), first, known.during(leg))
+        error[leg.start : leg.end + 1], control[leg.start : leg.end], first = rms.error, rms.control, rms.last
     return error, control

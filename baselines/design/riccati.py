@@ -10,9 +10,13 @@ import control
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from baselines.design.riccati_solver import check_state_weights, in_some_units, no_regulator
 from formation_env.numerics.arrays import Array
 from formation_env.numerics.jit import compiled_loop
+from formation_env.settings import ConfigError
 
+SLOWEST_FADING: Final = 1e-9
+"""Least share of an error that a regulator takes off in a step (or a second); less is rounding, or drag."""
 OVERLOAD: Final = 10.0
 """How much more a control costs in `least_fuel_gains`, per limit beyond the limit."""
 
@@ -25,14 +29,27 @@ def stationary(Phi: Array, Gamma: Array, Q: Array, R: Array) -> tuple[Array, Arr
         Gamma: input matrix (6, 3).
         Q: state weight (6, 6).
         R: control weight (3, 3).
+
+    Raises:
+        ConfigError: these weights give no stable regulator.
     """
-    # In units of the loop itself (c per s^2 of acceleration, c^(-1/2) s of time): in SI the solver fails at some steps.
+    check_state_weights(Q)
+    # c^(-1/2) is the time constant of the loop, s
     c = np.sqrt(np.trace(Q[:3, :3]) / np.trace(R)) or 1.0
-    scale = np.repeat([1.0, np.sqrt(c)], 3)
-    K, P, _ = control.dlqr(
-        Phi * scale / scale[:, None], Gamma * c / scale[:, None], Q * np.outer(scale, scale), R * c**2
-    )
-    return np.asarray(c * K / scale), np.asarray(P / np.outer(scale, scale))
+
+    def solve(factor: float) -> tuple[Array, Array, Array]:
+        # In units of the loop itself (c per s^2 of acceleration, c^(-1/2) s of time): in SI the solver fails at times.
+        unit = c * factor
+        scale = np.repeat([1.0, np.sqrt(unit)], 3)
+        K, P, poles = control.dlqr(
+            Phi * scale / scale[:, None], Gamma * unit / scale[:, None], Q * np.outer(scale, scale), R * unit**2
+        )
+        return np.asarray(unit * K / scale), np.asarray(P / np.outer(scale, scale)), np.abs(poles)
+
+    K, P, sizes = in_some_units(solve, no_regulator(Q, R))
+    if not sizes.max() < 1 - SLOWEST_FADING:
+        raise ConfigError(no_regulator(Q, R))
+    return K, P
 
 
 def continuous_gain(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]:
@@ -43,9 +60,24 @@ def continuous_gain(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Arra
         B: control matrix (6, 3).
         Q: state weight (6, 6).
         R: control weight (3, 3).
+
+    Raises:
+        ConfigError: these weights give no stable regulator.
     """
-    K, P, _ = control.lqr(A, B, Q, R)
-    return np.asarray(K), np.asarray(P)
+    check_state_weights(Q)
+
+    def solve(factor: float) -> tuple[Array, Array, Array]:
+        # time in units of 1 / factor s: velocities and rates change by the factor, the control by its square
+        scale = np.repeat([1.0, factor], 3)
+        K, P, poles = control.lqr(
+            A * scale / scale[:, None] / factor, B * factor / scale[:, None], Q * np.outer(scale, scale), R * factor**4
+        )
+        return np.asarray(factor**2 * K / scale), np.asarray(factor * P / np.outer(scale, scale)), poles.real
+
+    K, P, growth = in_some_units(solve, no_regulator(Q, R))
+    if not growth.max() < -SLOWEST_FADING:
+        raise ConfigError(no_regulator(Q, R))
+    return K, P
 
 
 def integrate_tracking(
@@ -193,7 +225,11 @@ def least_fuel_gains(
 
     Returns:
         Gains (steps, 3, 6).
+
+    Raises:
+        ConfigError: the last state has no weight.
     """
+    check_state_weights(terminal)
     no_cost, weights = np.zeros((6, 6)), np.ones(len(R))
     gains = finite_horizon_gains(Phi, Gamma, no_cost, R, terminal)
     for _ in range(rounds):

@@ -1,4 +1,4 @@
-"""When to fire in a hold: coast until the error to come leaves a band, then give the one impulse that helps most.
+"""Station keeping in a hold: coast until the predicted error leaves a band, then give the most helpful impulse.
 
 Legend: A (7, 7) the error over a step with the reference's own residual, e~ = (e, 1); M (7, 7) the sum of squared
 position errors over the steps to come if the follower coasts, e~' M e~.
@@ -41,7 +41,7 @@ class StationKeeping:
     def __init__(self, scenario: Scenario, settings: StationKeepingSettings) -> None:
         self._settings, self._window = settings, max(1, scenario.steps(settings.look_ahead_orbits))
         self._A = by_steps_left(scenario, lambda leg: error_steps(scenario, leg))
-        # the impulse acts over the step, so what counts is the sum from the step's end on
+        # the impulse acts over the step, so the sum from the step's end on counts
         self._M = by_steps_left(scenario, lambda leg: coasting_sums(error_steps(scenario, leg), self._window)[1:])
         self._Gamma = by_steps_left(scenario, lambda leg: scenario.filter_dynamics().steps(leg.start, leg.end).Gamma)
 
@@ -79,7 +79,7 @@ def _times(matrix: Array, vector: NDArray[np.floating]) -> Array:
 
 
 def error_steps(scenario: Scenario, leg: Leg) -> Array:
-    """A of each step of a phase (steps, 7, 7): (e, 1) -> (Phi e + what the reference lacks to be natural, 1)."""
+    """A of each step of a phase (steps, 7, 7): (e, 1) -> (Phi e + the reference's deviation from a coast, 1)."""
     model = scenario.filter_dynamics().steps(leg.start, leg.end)
     reference = leg_reference(scenario, leg, np.arange(leg.start, leg.end + 1))
     A = np.zeros((leg.end - leg.start, 7, 7))

@@ -1,4 +1,4 @@
-"""The Kalman filter that the environments' one becomes when no measurement is lost: gains by python-control.
+"""Steady state of the environments' Kalman filter without lost measurements, by python-control.
 
 Legend: H measurement matrix, R_noise and Q_noise noise covariances, P covariance of the estimate's error.
 """
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import control
 import numpy as np
 
+from baselines.design.riccati_solver import in_some_units
 from formation_env.numerics.arrays import Array
 from formation_env.task.scenario import Scenario
 
@@ -35,7 +36,7 @@ def measurement(scenario: Scenario) -> tuple[Array, Array]:
 
 
 def stationary_filter(scenario: Scenario) -> StationaryFilter:
-    """What a scenario's filter settles at without losses and thrust noise, by its own beliefs.
+    """The steady state of a scenario's filter without losses and thrust noise, by the filter's own model.
 
     With the gains of `riccati.stationary` it makes the LQG controller of constant gains.
 
@@ -50,7 +51,28 @@ def stationary_filter(scenario: Scenario) -> StationaryFilter:
     for key, value in (("process_noise_m_s2", filter_model.process_noise_m_s2), ("sigma", R_noise.diagonal().min())):
         if value <= 0:
             raise ValueError(f"{key}: must be > 0 for a stationary filter, got {value:g}")
-    # python-control's gain is that of the predictor, Phi K
-    L, predicted, _ = control.dlqe(model.Phi, model.Gamma, H, filter_model.process_noise_m_s2**2 * np.eye(3), R_noise)
-    gain = np.linalg.solve(model.Phi, np.asarray(L))
-    return StationaryFilter(gain, np.asarray(predicted), (np.eye(6) - gain @ H) @ predicted)
+    push = filter_model.process_noise_m_s2 * model.Gamma
+
+    def solve(factor: float) -> Array:
+        unit = _units(scenario) * np.repeat([1.0, factor], 3)
+        Phi, G, seen = model.Phi * unit / unit[:, None], push / unit[:, None], unit[: len(H)]
+        Q_noise = G @ G.T
+        _, P, _ = control.dlqe(Phi, np.eye(6), H, (Q_noise + Q_noise.T) / 2, R_noise / np.outer(seen, seen))
+        return np.asarray(P * np.outer(unit, unit))
+
+    predicted = in_some_units(solve, "filter: its noises and step give no stationary covariance that can be solved for")
+    # K = P H' (H P H' + R)^-1
+    gain = np.linalg.solve(H @ predicted @ H.T + R_noise, H @ predicted).T
+    return StationaryFilter(np.asarray(gain), predicted, np.asarray((np.eye(6) - gain @ H) @ predicted))
+
+
+def _units(scenario: Scenario) -> Array:
+    """Units (6,) in which the filter's equation is of order one: in SI the solver fails at times.
+
+    The time is the filter's own memory sqrt(sigma_pos / process noise) or the step, the length the sensor's error or
+    what the noise pushes in a step.
+    """
+    model, dt_s = scenario.filter_model, scenario.dt_s
+    time_s = max(np.sqrt(model.sigma_pos_m / model.process_noise_m_s2), dt_s)
+    length_m = max(model.sigma_pos_m, model.process_noise_m_s2 * dt_s**2)
+    return np.repeat([length_m, length_m / time_s], 3)

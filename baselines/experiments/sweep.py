@@ -6,7 +6,6 @@ from typing import Any, Final, Self
 
 import numpy as np
 import pandas as pd
-from pydantic import ValidationError
 
 from baselines.experiments.estimates import ratio_of_means
 from baselines.experiments.parallel import Progress
@@ -17,7 +16,7 @@ from formation_env.dynamics import NONLINEAR
 from formation_env.evaluation.rollout import Policy, evaluate
 from formation_env.evaluation.statistics import bootstrap_interval
 from formation_env.numerics.arrays import Array
-from formation_env.settings import ConfigError
+from formation_env.settings import ConfigError, faults_of
 from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import build_schedule, column, columns
 
@@ -173,9 +172,8 @@ def _varied(env: str, scenario: Scenario, coarse: bool) -> Iterator[tuple[str, f
         for value in variation.few if coarse else variation.values:
             try:
                 flown, believed = variation.vary(scenario, value)
-            except ValidationError as error:
-                fault = error.errors()[0]["msg"].removeprefix("Value error, ")
-                raise ConfigError(f"sweep: {env}: {quantity} = {value:g}: {fault}") from None
+            except ConfigError as error:
+                raise ConfigError(f"sweep: {env}: {quantity} = {value:g}: {faults_of(error)}") from None
             yield quantity, value, flown, believed
 
 

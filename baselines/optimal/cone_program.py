@@ -1,6 +1,6 @@
 """A control problem with the environment's cost as a second-order cone program: for whole episodes and for horizons.
 
-    minimise  sum dt_j |(u_j, sigma_j)| + sum w_j (linear |(x_j - r_j, rho_j)| + quadratic |x_j - r_j|^2)
+    minimise  sum dt_j |(u_j, sigma_j)| + sum w_j (linear s_j + quadratic s_j^2),   s_j = |(x_j - r_j, rho_j)|
     so that   x_(j+1) = F_j x_j + G_j u_j + d_j,   |u_j| <= limit_j along each axis,   x_m = goal_m at the instants met
 
 over blocks j of one or more steps, each of constant thrust. A block couples neighbours only, so the program is sparse
@@ -8,7 +8,7 @@ and its solution takes a time in proportion to the blocks. sigma and rho are the
 about the plan: where something scatters anyway, a little more costs next to nothing, as E|e + w| is flat at e = 0.
 
 Legend: F, G, d the model over a block; x states at the blocks' ends, u accelerations, t >= |(u, sigma)|,
-s >= |(x - r, rho)|. Variables in order: x (6 N), u (3 N), t (N), s (one for each error with a linear cost).
+s >= |(x - r, rho)|. Variables in order: x (6 N), u (3 N), t (N), s (one for each error with a weight).
 """
 
 from dataclasses import dataclass
@@ -124,13 +124,13 @@ class ConeProgram:
         self._problem, self._units = problem, units
         self._scale = np.repeat([units.length_m, units.speed_m_s], 3)
         self._count = len(problem.F)
-        self._coned = np.flatnonzero(problem.error_weight * problem.cost.linear)
+        self._weighted = np.flatnonzero(problem.error_weight > 0)
         parts = [self._motion(), self._meeting(), self._box(), self._thrust_cones(), self._error_cones()]
         A = sparse.vstack([matrix for matrix, _ in parts]).tocsc()
         self._b = np.concatenate([b for _, b in parts])
         zero, positive = len(parts[0][1]) + len(parts[1][1]), len(parts[2][1])
         P, q = self._objective()
-        cones = Cones(zero, positive, self._count + len(self._coned), self._cone_size)
+        cones = Cones(zero, positive, self._count + len(self._weighted), self._cone_size)
         self._solver = ConeSolver(P, q, A, cones, tolerance=tolerance)
 
     def solve(self, start: Array) -> Plan:
@@ -144,7 +144,7 @@ class ConeProgram:
         solution = self._solver.solve(b)
         x = solution.x
         return Plan(
-            cost_m_s=solution.cost * self._cost_unit + self._constant(),
+            cost_m_s=solution.cost * self._cost_unit,
             states=x[: 6 * n].reshape(n, 6) * self._scale,
             controls=x[6 * n : 9 * n].reshape(n, 3) * h.limit_m_s2[:, None],
             solved=solution.solved,
@@ -155,10 +155,8 @@ class ConeProgram:
     def multipliers(self, plan: Plan) -> Array:
         """Multipliers (N + 1, 6) of the errors, from the start on, see `certificate`, m/s per m and per m/s."""
         h, result = self._problem, np.zeros((self._count + 1, 6))
-        off = plan.states[:, :3] - h.place_m
-        result[1:, :3] = 2 * (h.cost.quadratic * h.error_weight[:, None]) * off
-        cones = plan.z[len(plan.z) - self._cone_size * len(self._coned) :].reshape(-1, self._cone_size)
-        result[1 + self._coned, :3] = -cones[:, 1:4] / self._units.length_m * self._cost_unit
+        cones = plan.z[len(plan.z) - self._cone_size * len(self._weighted) :].reshape(-1, self._cone_size)
+        result[1 + self._weighted, :3] = -cones[:, 1:4] / self._units.length_m * self._cost_unit
         meeting = plan.z[6 * self._count : 6 * (self._count + len(h.met))].reshape(-1, 6)
         result[[1 + block for block in h.met]] = meeting / self._scale * self._cost_unit
         return result
@@ -175,25 +173,15 @@ class ConeProgram:
 
     def _width(self) -> int:
         """Number of variables."""
-        return 10 * self._count + len(self._coned)
+        return 10 * self._count + len(self._weighted)
 
     def _objective(self) -> tuple[Any, Array]:
         """P and q of x'Px / 2 + q'x."""
         h, n, length, unit = self._problem, self._count, self._units.length_m, self._cost_unit
-        # w c |x - r|^2 = w c |x|^2 - 2 w c r.x + a constant, with c the quadratic coefficient
-        squares, slopes = np.zeros((2, n, 6))
-        weight = 2 * (h.cost.quadratic * h.error_weight)[:, None] / unit
-        squares[:, :3], slopes[:, :3] = weight * length**2, -weight * length * h.place_m
         thrust = h.duration_s / self._units.time_s * (h.limit_m_s2 / self._units.accel_m_s2)
-        errors = h.error_weight[self._coned] * length / unit
-        P = np.concatenate([squares.ravel(), np.zeros(4 * n + len(self._coned))])
-        return sparse.diags(P).tocsc(), np.concatenate([slopes.ravel(), np.zeros(3 * n), thrust, errors])
-
-    def _constant(self) -> float:
-        """The part of a quadratic cost that no plan changes, m/s."""
-        h = self._problem
-        squares = (h.place_m**2).sum(axis=1) + (0.0 if h.error_scatter_m is None else h.error_scatter_m**2)
-        return float(h.cost.quadratic * h.error_weight @ squares)
+        weight = h.error_weight[self._weighted] * length / unit
+        P = np.concatenate([np.zeros(10 * n), 2 * weight * h.cost.quadratic * length])
+        return sparse.diags(P).tocsc(), np.concatenate([np.zeros(9 * n), thrust, weight * h.cost.linear])
 
     def _motion(self) -> tuple[Any, Array]:
         """x_(j+1) - F_j x_j - G_j u_j = d_j."""
@@ -203,7 +191,7 @@ class ConeProgram:
         # F of the first block acts on the start, which stands on the right-hand side
         past = sparse.bsr_array((F[1:], along[: n - 1], np.concatenate([[0], along])), shape=(6 * n, 6 * n))
         push = sparse.bsr_array((G, along, np.arange(n + 1)), shape=(6 * n, 3 * n))
-        rest = sparse.csc_array((6 * n, n + len(self._coned)))
+        rest = sparse.csc_array((6 * n, n + len(self._weighted)))
         return sparse.hstack([sparse.eye_array(6 * n) - past, -push, rest]), (h.d / scale).ravel()
 
     def _meeting(self) -> tuple[Any, Array]:
@@ -217,7 +205,7 @@ class ConeProgram:
         """-1 <= u <= 1 along each axis, in units of the limit."""
         n = self._count
         both = sparse.vstack([sparse.eye_array(3 * n), -sparse.eye_array(3 * n)])
-        rest = sparse.csc_array((6 * n, n + len(self._coned)))
+        rest = sparse.csc_array((6 * n, n + len(self._weighted)))
         return sparse.hstack([sparse.csc_array((6 * n, 6 * n)), both, rest]), np.ones(6 * n)
 
     def _thrust_cones(self) -> tuple[Any, Array]:
@@ -229,13 +217,13 @@ class ConeProgram:
         return self._cones(9 * n + np.arange(n), 6 * n + 3 * np.arange(n)), b.ravel()
 
     def _error_cones(self) -> tuple[Any, Array]:
-        """(s_j, x_j - r_j, rho_j) in the cone, at the blocks' ends with a linear cost."""
-        h, coned, length = self._problem, self._coned, self._units.length_m
-        b = np.zeros((len(coned), self._cone_size))
-        b[:, 1:4] = -h.place_m[coned] / length
+        """(s_j, x_j - r_j, rho_j) in the cone, at the blocks' ends whose errors have a weight."""
+        h, weighted, length = self._problem, self._weighted, self._units.length_m
+        b = np.zeros((len(weighted), self._cone_size))
+        b[:, 1:4] = -h.place_m[weighted] / length
         if h.error_scatter_m is not None:
-            b[:, 4] = h.error_scatter_m[coned] / length
-        return self._cones(10 * self._count + np.arange(len(coned)), 6 * coned), b.ravel()
+            b[:, 4] = h.error_scatter_m[weighted] / length
+        return self._cones(10 * self._count + np.arange(len(weighted)), 6 * weighted), b.ravel()
 
     def _cones(self, lengths: NDArray[np.intp], vectors: NDArray[np.intp]) -> Any:
         """Rows of cones, given the columns of their lengths and of the first of three components."""

@@ -51,24 +51,21 @@ def fuel_optimal(
 ) -> OptimalPlan:
     """Perfect-information lower bound (hindsight optimum) of an episode's cost, by the environment's own objective.
 
-    The true start and all disturbances are known; time grid, thrust limit of each axis and true linear dynamics are the
-    environment's. So it is a lower bound for every policy on that seed, as long as the episode runs to its end: early
-    ends are not in the program (one costs what staying at the distance limit does, which is far more).
-    A minimum thrust is left out, which only lowers the bound. The thruster's random error is known like the rest: step
-    by step it scales the limit, and the acceleration that acts is what costs.
+    Time grid, thrust limit and true linear dynamics are the environment's; start and disturbances are known, and so is
+    the thruster's random error, which scales the limit of each step. So no policy costs less on that seed, as long as
+    the episode runs to its end: an early end costs as much as staying at the distance limit, which is far more. A
+    minimum thrust is left out, which only lowers the bound.
 
     Args:
         scenario: a registered id, a scenario's name or path, or a Scenario, with a linear truth.
         seed: of the episode whose start and disturbances are met.
         initial_state: LVLH state (6,) to start at undisturbed, m and m/s; without it and without a seed the nominal
             start.
-        exact_arrival: in place of the weight of errors, be at the reference at the two ends of each transfer, but for
-            the very start; between them errors are free.
+        exact_arrival: meet the reference at the ends of each transfer instead of weighing errors.
         cache_folder: folder of cached plans; None disables caching.
 
     Raises:
-        ValueError: a nonlinear truth, both a seed and a state, a state of wrong shape, no transfer to arrive from, or
-            an arrival out of the thruster's reach.
+        ValueError: an impossible problem, see `episode_problem`, or an arrival out of the thruster's reach.
         SolverError: the solver failed (a RuntimeError).
         OSError: the folder cannot be written.
         ModuleNotFoundError: Clarabel is not installed; it comes with the extra `optimal`.

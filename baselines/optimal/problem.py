@@ -95,7 +95,7 @@ def episode_problem(
 
 
 def flown_scenario(scenario: Scenario, seed: int) -> Scenario:
-    """What the episode of a seed flies: the scenario, or with domain randomization one of its variants."""
+    """Scenario of a seed's episode: with domain randomization one of the variants."""
     if scenario.domain_randomization is None:
         return scenario
     env = FormationEnv(scenario)

@@ -1,1 +1,1 @@
-"""The source thesis, reproduced: Ma Jian, Formation Flying of Spacecrafts for Monitoring and Inspection, 2009."""
+"""Reproduction of the source thesis: Ma Jian, Formation Flying of Spacecrafts for Monitoring and Inspection, 2009."""

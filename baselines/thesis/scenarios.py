@@ -1,7 +1,7 @@
-"""The thesis's scenarios, their variations, and its control laws.
+"""Scenarios of the thesis, their variations, and its control laws.
 
-Everything is made from the shipped `thesis_*` files, in which the printed settings stand. A step of another length may
-be given to each, since 1 s takes long.
+All are made from the shipped `thesis_*` files, which hold the printed settings. Each takes another time step, since 1 s
+is slow.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from formation_env.task.loading import config_folder, load_scenario
 from formation_env.task.scenario import Phase, Scenario
 
 ENTRY: Final = ProjectedCircle(x0_m=0.0, vx0_m_s=1.8)
-"""The orbit that section 5.2.4 enters at [0, 3324, 0, 1.8, 0, 3.6]."""
+"""Orbit that section 5.2.4 enters at [0, 3324, 0, 1.8, 0, 3.6]."""
 
 
 def _shipped(name: str, dt_s: float | None) -> Scenario:
@@ -94,7 +94,7 @@ def reconfiguration(
 
 
 def with_velocity(scenario: Scenario, velocity_m_s: Sequence[float]) -> Array:
-    """A start (6,) at the scenario's nominal place with another velocity, for `flights.fly`."""
+    """Initial state (6,) at the scenario's nominal position with another velocity, for `fly_laws`."""
     place = scenario.start.formation.state(scenario.orbit)
     return np.concatenate([place[:3], velocity_m_s])
 
@@ -117,28 +117,32 @@ def mission(dt_s: float | None = None, entry: ProjectedCircle = ENTRY) -> Scenar
 
 
 def law(name: str, scenario: Scenario, shipped: str, control_s2: float | None = None) -> AccelerationPolicy:
-    """One of the thesis's control laws with its printed gains.
+    """Control law of the thesis with its printed settings.
 
     Args:
         name: `lqr_quasi_static` (the thesis's LQR), `lqr` (error-state feedback with the same weights) or `smc`.
-        scenario: what it flies.
-        shipped: whose gains: a file in configs/baselines, such as `thesis_keeping`.
+        scenario: scenario flown.
+        shipped: name of a settings file in configs/baselines, such as `thesis_keeping`.
         control_s2: factor a of the control weight R = a I / n^2 in place of the printed one, s^2.
     """
-    gains = read_settings(name, config_folder("baselines") / f"{shipped}.yaml")
-    return make_policy(name, scenario, gains if control_s2 is None else reweighted(gains, control_s2))
+    settings = read_settings(name, config_folder("baselines") / f"{shipped}.yaml")
+    return make_policy(name, scenario, settings if control_s2 is None else reweighted(settings, control_s2))
 
 
-def reweighted(gains: Any, control_s2: float) -> LQRSettings | LQRQuasiStaticSettings:
-    """Gains of a regulator with the control weight R = a I / n^2, a in s^2.
+def reweighted(settings: Any, control_s2: float) -> LQRSettings | LQRQuasiStaticSettings:
+    """Settings of a regulator with the control weight R = a I / n^2, a in s^2.
 
     Raises:
-        ValueError: gains of something else.
+        ValueError: settings without a control weight.
     """
     R = Weights(control_s2=(control_s2, control_s2, control_s2)).control_s2
-    if isinstance(gains, LQRQuasiStaticSettings):
-        return replace(gains, hold=replace(gains.hold, control_s2=R), transfer=replace(gains.transfer, control_s2=R))
-    if isinstance(gains, LQRSettings):
-        weights = replace(gains.transfer.weights, control_s2=R)
-        return replace(gains, hold=replace(gains.hold, control_s2=R), transfer=replace(gains.transfer, weights=weights))
-    raise ValueError(f"reweighted: {type(gains).__name__} has no control weight")
+    if isinstance(settings, LQRQuasiStaticSettings):
+        return replace(
+            settings, hold=replace(settings.hold, control_s2=R), transfer=replace(settings.transfer, control_s2=R)
+        )
+    if isinstance(settings, LQRSettings):
+        weights = replace(settings.transfer.weights, control_s2=R)
+        return replace(
+            settings, hold=replace(settings.hold, control_s2=R), transfer=replace(settings.transfer, weights=weights)
+        )
+    raise ValueError(f"reweighted: {type(settings).__name__} has no control weight")

@@ -1,1 +1,1 @@
-"""Search of gains: the same procedure and budget for every policy that has free settings."""
+"""Search of policy settings: the same procedure and budget for every policy that has a search space."""

@@ -1,4 +1,4 @@
-"""What a dropout model offers: a two-state Markov chain of the link, and times at which it is closed for certain."""
+"""Interface of dropout models: a two-state Markov chain of the link, and scheduled outages."""
 
 from dataclasses import dataclass
 
@@ -28,18 +28,18 @@ class LinkChain:
 
 
 class Dropout:
-    """A link that never fails; models override what they change."""
+    """A link that never fails; subclasses, made with `settings`, override what they change."""
 
-    kind: str
+    kind: str = "custom"
 
     def chain(self, dt_s: float, orbit: Orbit) -> LinkChain:
         """The link's Markov chain at steps of dt_s, s.
 
         Raises:
-            ValueError: the chain cannot be had with this step.
+            ValueError: no chain has the settings' mean lengths at this step.
         """
         return LinkChain()
 
     def closed(self, times_s: Array) -> NDArray[np.bool_]:
-        """Whether the link is closed for certain at times (T,), s."""
+        """Whether a scheduled outage closes the link at each of the times (T,), s."""
         return np.zeros(len(times_s), bool)

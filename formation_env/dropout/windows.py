@@ -1,13 +1,17 @@
 """Outages at given times."""
 
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from formation_env.dropout.base import Dropout
 from formation_env.numerics.arrays import Array
-from formation_env.settings import NonNegative, Positive, settings
+from formation_env.quantities import Duration, PositiveDuration
+from formation_env.settings import settings
+
+TOLERANCE: Final = 1e-12
+"""Relative error of an instant k dt that rounding may cause; at most a millionth of a step, as k is at most 1e6."""
 
 
 @settings
@@ -19,8 +23,8 @@ class Window:
         duration_s: how long it lasts, s.
     """
 
-    start_s: NonNegative
-    duration_s: Positive
+    start_s: Duration
+    duration_s: PositiveDuration
 
 
 @settings
@@ -37,6 +41,8 @@ class Windows(Dropout):
     def closed(self, times_s: Array) -> NDArray[np.bool_]:
         """Whether a window covers each of the times (T,), s."""
         covered = np.zeros(len(times_s), bool)
+        # k dt may round to just below the decimal that the settings name: an instant so close to an end is at it
+        latest = times_s * (1 + TOLERANCE)
         for window in self.windows:
-            covered |= (window.start_s <= times_s) & (times_s < window.start_s + window.duration_s)
+            covered |= (window.start_s <= latest) & (latest < window.start_s + window.duration_s)
         return covered

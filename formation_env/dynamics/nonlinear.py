@@ -11,22 +11,16 @@ LVLH is the frame that truly rotates with the leader, at omega = [r a_h / h, 0, 
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from formation_env.dynamics.perturbations import Perturbations
+from formation_env.dynamics.coasting import coast
 from formation_env.dynamics.spacecraft import Spacecraft
+from formation_env.dynamics.world import World
 from formation_env.numerics.arrays import Array
-from formation_env.orbital import accelerations
-from formation_env.orbital.atmosphere import exponential_density_kg_m3
-from formation_env.orbital.constants import MU_MOON, MU_SUN, R_EARTH
 from formation_env.orbital.elements import to_cartesian
 from formation_env.orbital.frames import eci_to_lvlh, lvlh_axes, lvlh_frame, lvlh_to_eci
-from formation_env.orbital.orbit import Orbit
-
-TOLERANCE: Final = 1e-12
-"""Relative error of the leader's path per step of its integration."""
 
 NODES: Final = (0.0, 1 / 3, 1 / 2, 2 / 3)
 """Instants within a substep at which the leader is needed, and the next substep's first."""
@@ -37,79 +31,6 @@ FAR_FIELDS: Final = {"sun": 18, "moon": 21}
 NEAR_WIDTH: Final = 3 * len(FIELDS)
 FAR_WIDTH: Final = NEAR_WIDTH + 3 * len(FAR_FIELDS)
 MAX_SUBSTEP_S: Final = 60.0
-
-
-@dataclass(frozen=True)
-class World:
-    """What the nonlinear truth is made of.
-
-    Attributes:
-        orbit: the leader's osculating orbit at t = 0.
-        perturbations: what acts beside gravity.
-    """
-
-    orbit: Orbit
-    perturbations: Perturbations
-
-    def density_kg_m3(self, position: Array, craft: Spacecraft) -> Array:
-        """Density of the air (...) at positions (..., 3); a spacecraft states it for the leader's altitude."""
-        altitude_m = np.linalg.norm(position, axis=-1) - R_EARTH
-        scale_m = self.perturbations.scale_height_m or np.inf
-        return exponential_density_kg_m3(altitude_m, craft.air_density_kg_m3, self.orbit.altitude_m, scale_m)
-
-    def sun_and_moon(self, times_s: Any) -> tuple[Array, Array]:
-        """Their positions (..., 3) at times (...), m."""
-        from formation_env.orbital.ephemeris import moon_position_m, sun_position_m  # ERFA is slow to import
-
-        epoch = self.perturbations.epoch_jd
-        return sun_position_m(epoch, times_s), moon_position_m(epoch, times_s)
-
-    def acceleration(self, times_s: Any, position: Array, velocity: Array, craft: Spacecraft) -> Array:
-        """Acceleration (..., 3) of a spacecraft at times (...), m/s^2.
-
-        Args:
-            times_s: times (...), s.
-            position: ECI (..., 3), m.
-            velocity: ECI (..., 3), m/s.
-            craft: its drag and its area.
-        """
-        (x, y, z), (vx, vy, vz), on = np.moveaxis(position, -1, 0), np.moveaxis(velocity, -1, 0), self.perturbations
-        parts = [accelerations.gravity(x, y, z, self.orbit.j2_coefficient)]
-        if on.drag:
-            density = self.density_kg_m3(position, craft)
-            parts.append(accelerations.drag(vx, vy, vz, density, craft.drag_area_per_mass_m2_kg))
-        if on.far_bodies:
-            (sx, sy, sz), (mx, my, mz) = (np.moveaxis(body, -1, 0) for body in self.sun_and_moon(times_s))
-            parts.append(accelerations.third_body(x, y, z, sx, sy, sz, MU_SUN * on.sun))
-            parts.append(accelerations.third_body(x, y, z, mx, my, mz, MU_MOON * on.moon))
-            area = craft.radiation_area_per_mass_m2_kg * on.radiation_pressure
-            parts.append(accelerations.radiation_pressure(x, y, z, sx, sy, sz, area))
-        return np.moveaxis(np.array(parts).sum(axis=0), 0, -1)
-
-
-def coast(world: World, craft: Spacecraft, states: Array, times_s: Array) -> Array:
-    """Fly without thrust in ECI (Dormand & Prince's method of order 8).
-
-    Args:
-        world: what acts.
-        craft: the spacecraft.
-        states: positions and velocities (N, 6) at t = 0, m and m/s.
-        times_s: times (T,), s, all of one sign and sorted away from 0.
-
-    Returns:
-        States (T, N, 6).
-    """
-    from scipy.integrate import solve_ivp  # slow to import, and linear truths do without it
-
-    def rates(time_s: float, y: Array) -> Array:
-        position, velocity = np.split(y.reshape(-1, 6), 2, axis=1)
-        return np.hstack([velocity, world.acceleration(time_s, position, velocity, craft)]).ravel()
-
-    if times_s[-1] == 0:
-        return np.broadcast_to(states, (len(times_s), *states.shape))
-    span = (0.0, float(times_s[-1]))
-    solution = solve_ivp(rates, span, states.ravel(), "DOP853", times_s, rtol=TOLERANCE, atol=1e-9)
-    return np.asarray(solution.y.T).reshape(len(times_s), -1, 6)
 
 
 @dataclass(frozen=True)
@@ -140,7 +61,7 @@ class Leader:
 
 def leader_path(world: World, craft: Spacecraft, times_s: Array) -> Leader:
     """The leader at times (T,), s, all of one sign and sorted away from 0."""
-    states = coast(world, craft, np.concatenate(to_cartesian(world.orbit.elements))[None], times_s)
+    states = coast(world, craft, np.concatenate(to_cartesian(world.orbit.elements))[None], times_s, who="leader")
     position, velocity = np.split(states[:, 0], 2, axis=1)
     acceleration = world.acceleration(times_s, position, velocity, craft)
     normal_accel = np.vecdot(acceleration, lvlh_axes(position, velocity)[:, 2])
@@ -163,7 +84,7 @@ def relative_path(world: World, follower: Spacecraft, leader: Spacecraft, states
     """
     start, path = leader_path(world, leader, np.zeros(1)), leader_path(world, leader, times_s)
     inertial = np.hstack(lvlh_to_eci(states[:, :3], states[:, 3:], *start.motion))
-    flown = coast(world, follower, inertial, times_s)
+    flown = coast(world, follower, inertial, times_s, who="follower")
     leaders = (part[:, None] for part in path.motion)
     return np.concatenate(eci_to_lvlh(flown[..., :3], flown[..., 3:], *leaders), axis=-1)
 

@@ -3,10 +3,11 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from formation_env.dynamics import NONLINEAR, get_dynamics
-from formation_env.dynamics.nonlinear import World, relative_path
+from formation_env.dynamics import NONLINEAR, check_truth, get_dynamics
+from formation_env.dynamics.nonlinear import relative_path
 from formation_env.dynamics.perturbations import Perturbations
 from formation_env.dynamics.spacecraft import Spacecraft
+from formation_env.dynamics.world import World
 from formation_env.numerics.arrays import Array
 from formation_env.orbital.orbit import Orbit
 
@@ -36,7 +37,8 @@ def propagate(
         States (..., T, 6), m and m/s.
 
     Raises:
-        ValueError: unknown model, wrong shape, a number that is not finite, or unequal air densities.
+        ValueError: unknown model, wrong shape, a number that is not finite, unequal air densities, an elliptic orbit
+            with a model of circular ones, perturbations with a linear model, or a spacecraft that re-enters.
     """
     states, times = np.asarray(initial_state, float), np.asarray(times_s, float)
     if states.ndim == 0 or states.shape[-1] != 6 or not np.isfinite(states).all():
@@ -48,6 +50,7 @@ def propagate(
     if leader.air_density_kg_m3 != follower.air_density_kg_m3:
         raise ValueError("leader_spacecraft.air_density_kg_m3: must be the follower's, they fly through the same air")
     orbit = orbit or Orbit()
+    check_truth(dynamics, orbit, perturbations or Perturbations())
     if dynamics == NONLINEAR:
         return _nonlinear(states, times, World(orbit, perturbations or Perturbations()), follower, leader)
     model = get_dynamics(dynamics).discretise(0.0, times, orbit, follower, leader)
@@ -62,5 +65,5 @@ def _nonlinear(states: Array, times_s: Array, world: World, follower: Spacecraft
         instants, places = np.unique(np.abs(times_s[side]), return_inverse=True)
         if len(instants):
             flown = relative_path(world, follower, leader, states.reshape(-1, 6), sign * instants)
-            path[side] = flown[places].reshape(-1, *states.shape)
+            path[side] = flown[places].reshape(len(places), *states.shape)
     return np.moveaxis(path, 0, -2)

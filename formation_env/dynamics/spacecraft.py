@@ -1,6 +1,15 @@
 """A spacecraft: its drag and its thruster."""
 
-from formation_env.settings import NonNegative, Positive, settings
+from formation_env.quantities import (
+    Acceleration,
+    AirDensity,
+    Area,
+    Coefficient,
+    Mass,
+    PositiveAcceleration,
+    ThrustNoise,
+)
+from formation_env.settings import settings
 
 
 @settings
@@ -18,14 +27,14 @@ class Spacecraft:
         thrust_noise: 1-sigma of the relative error of the thrust's magnitude, drawn anew each step.
     """
 
-    mass_kg: Positive = 50.0
-    area_m2: NonNegative = 0.16
-    drag_coefficient: NonNegative = 1.0
-    air_density_kg_m3: NonNegative = 1.04e-13
-    radiation_coefficient: NonNegative = 1.0
-    max_accel_m_s2: Positive = 0.1
-    min_accel_m_s2: NonNegative = 0.0
-    thrust_noise: NonNegative = 0.0
+    mass_kg: Mass = 50.0
+    area_m2: Area = 0.16
+    drag_coefficient: Coefficient = 1.0
+    air_density_kg_m3: AirDensity = 1.04e-13
+    radiation_coefficient: Coefficient = 1.0
+    max_accel_m_s2: PositiveAcceleration = 0.1
+    min_accel_m_s2: Acceleration = 0.0
+    thrust_noise: ThrustNoise = 0.0
 
     @property
     def drag_area_per_mass_m2_kg(self) -> float:

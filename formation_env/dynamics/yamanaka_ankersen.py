@@ -4,16 +4,21 @@ Legend: e eccentricity, theta true anomaly, rho = 1 + e cos theta, p semi-latus 
 theta' = k2 rho^2.
 """
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from formation_env.dynamics.base import DiscreteModel, Dynamics, control_matrix
 from formation_env.dynamics.spacecraft import Spacecraft
 from formation_env.numerics.arrays import Array
+from formation_env.orbital.kepler import solve_kepler, true_to_mean
 from formation_env.orbital.orbit import Orbit
 
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
-"""Quadrature of the input matrix: exact to rounding for steps up to a tenth of the orbit."""
+FEWEST_NODES: Final = 6
+"""Nodes of the input matrix's quadrature for short steps."""
+NODES_PER_RADIAN: Final = 5
+"""Further nodes for each radian of eccentric anomaly in a step: exact to rounding up to e = 0.9 and half an orbit."""
 
 
 class YamanakaAnkersen(Dynamics):
@@ -47,10 +52,27 @@ class YamanakaAnkersen(Dynamics):
         """Phi in closed form, Gamma = integral of Phi(end, s) B ds by Gauss's quadrature (Ma 2009, eq. 4.6-4.7)."""
         start, step = np.broadcast_arrays(np.asarray(start_s, float), np.asarray(step_s, float))
         end = start + step
-        nodes = start[..., None] + step[..., None] * (1 + _NODES) / 2
+        nodes, weights_s = _quadrature(orbit, start, step)
         inputs = transition_matrix(orbit, nodes, end[..., None]) @ control_matrix()
-        Gamma = step[..., None, None] / 2 * np.einsum("q,...qij->...ij", _WEIGHTS, inputs)
+        Gamma = np.einsum("...q,...qij->...ij", weights_s, inputs)
         return DiscreteModel(transition_matrix(orbit, start, end), Gamma, np.zeros((*start.shape, 6)))
+
+
+def _quadrature(orbit: Orbit, start_s: Array, step_s: Array) -> tuple[Array, Array]:
+    """Instants (..., q) and weights (..., q), s, of an integral over time steps (...): Gauss's in eccentric anomaly E.
+
+    In time the integrand has a peak at perigee, in E it is smooth: dt = (1 - e cos E) / n dE.
+    """
+    e, n = orbit.eccentricity, orbit.mean_motion_rad_s
+    mean = true_to_mean(np.radians(orbit.true_anomaly_deg), e) + n * start_s
+    mean = mean - 2 * np.pi * np.round(mean / (2 * np.pi))  # small numbers keep their digits
+    E_start, E_end = solve_kepler(mean, e)[..., None], solve_kepler(mean + n * step_s, e)[..., None]
+    half = (E_end - E_start) / 2
+    count = FEWEST_NODES + int(NODES_PER_RADIAN * 2 * np.max(np.abs(half), initial=0.0))
+    places, weights = np.polynomial.legendre.leggauss(count)
+    E = E_start + half * (1 + places)
+    elapsed_s = (E - E_start - e * (np.sin(E) - np.sin(E_start))) / n
+    return start_s[..., None] + elapsed_s, half * weights * (1 - e * np.cos(E)) / n
 
 
 def transition_matrix(orbit: Orbit, start_s: ArrayLike, end_s: ArrayLike) -> Array:

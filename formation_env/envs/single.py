@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from formation_env.envs import interface
 from formation_env.kernel.metrics import episode_metrics
-from formation_env.kernel.simulation import Simulation
+from formation_env.kernel.simulation import RESULT_PLACES, Simulation
 from formation_env.rendering.modes import FRAMES_PER_S, RENDER_MODES
 from formation_env.rendering.moment import Trail
 from formation_env.task.loading import load_scenario
@@ -20,6 +20,9 @@ from formation_env.task.scenario import Scenario
 Observation = NDArray[np.float32]
 
 _ONLY_ROW = np.zeros(1, np.intp)
+_REWARD, _TERMINATED, _TRUNCATED, _THRUST = (
+    RESULT_PLACES[name] for name in ("reward", "terminated", "truncated", "thrust")
+)
 
 
 class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -57,7 +60,8 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.action_space = interface.action_space()
         self.observation_space = interface.observation_space()
         self.simulation = Simulation(self.scenario, 1)
-        self._info_scalars = interface.info_scalars(self.scenario)
+        scalars = interface.info_scalars(self.scenario)
+        self._info_scalars = [(name, RESULT_PLACES[result], kind) for name, (result, kind) in scalars.items()]
         self._analysis = analysis
         self._keyed = False
         self._renderer: Any = None
@@ -121,20 +125,20 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         simulation.step(observations)
         values = simulation.first_row_results()
         info = self._info(values)
-        terminated, truncated = values["terminated"] > 0.5, values["truncated"] > 0.5
+        terminated, truncated = values[_TERMINATED] > 0.5, values[_TRUNCATED] > 0.5
         if terminated or truncated:
             info[interface.TOTALS] = {name: float(value[0]) for name, value in episode_metrics(simulation).items()}
         if self._trail is not None:
             self._show(self._trail)
-        return observations[0], values["reward"], terminated, truncated, info
+        return observations[0], values[_REWARD], terminated, truncated, info
 
-    def _info(self, values: dict[str, float]) -> dict[str, Any]:
+    def _info(self, values: list[float]) -> dict[str, Any]:
         """Info of the last step, from the results of the one row."""
         simulation = self.simulation
         info: dict[str, Any] = {name: simulation.first_row_state(name) for name in interface.INFO_STATES}
-        info[interface.INFO_THRUST] = np.array([values["thrust_x"], values["thrust_y"], values["thrust_z"]])
-        for name, (result, kind) in self._info_scalars.items():
-            info[name] = kind(values[result])
+        info[interface.INFO_THRUST] = np.array(values[_THRUST : _THRUST + 3])
+        for name, place, kind in self._info_scalars:
+            info[name] = kind(values[place])
         if self._analysis:
             info |= {name: value[0] for name, value in interface.analysis_infos(simulation).items()}
         return info

@@ -60,17 +60,13 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             ConfigError: the scenario is wrong.
             ValueError: no rows, a render mode, an unknown autoreset mode or no steps.
         """
-        if num_envs < 1:
-            raise ValueError(f"num_envs: must be at least 1, got {num_envs}")
-        if render_mode is not None:
-            raise ValueError(f"render_mode: the batched environment has none, got {render_mode!r}")
-        if max_episode_steps is not None and max_episode_steps < 1:
-            raise ValueError(f"max_episode_steps: must be at least 1, got {max_episode_steps}")
+        _check_arguments(num_envs, render_mode, max_episode_steps)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.scenario = load_scenario(scenario)
         self.num_envs = num_envs
         self.max_episode_steps = min(max_episode_steps or self.scenario.num_steps, self.scenario.num_steps)
+        self._is_cut = self.max_episode_steps < self.scenario.num_steps
         self._spec: EnvSpec | None = None
         self.render_mode = None
         self.single_action_space = interface.action_space()
@@ -82,7 +78,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self._observations = self.simulation.new_observations()
         self._analysis = analysis
         self._keyed = False
-        self._ended = np.zeros(num_envs, bool)
+        self._waiting = np.empty(0, np.intp)  # rows that ended and are not reset yet
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -117,7 +113,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             self._np_random, self._np_random_seed = gymnasium.utils.seeding.np_random(seeds.start)
         self._seed(seeds, rows)
         self.simulation.reset(rows, self._observations, None if starts is None else starts[rows])
-        self._ended[rows] = False
+        self._waiting = np.setdiff1d(self._waiting, rows)
         return self._observations.copy(), self._infos(rows if len(rows) < self.num_envs else slice(None))
 
     def _rows(self, mask: Any) -> NDArray[np.intp]:
@@ -149,50 +145,46 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             gymnasium.error.ResetNeeded: before the first reset, or a row has ended and autoreset is disabled.
         """
         actions = interface.check_actions(actions, self.num_envs)
-        waiting = np.flatnonzero(self._ended)
-        self._check_ready(waiting)
+        self._check_ready()
         simulation = self.simulation
         simulation.actions[:] = actions
         simulation.step(self._observations)
-        if len(waiting):  # a reset overwrites the rows' step, and clears their flags
-            simulation.reset(waiting, self._observations)
+        if len(self._waiting):  # a reset overwrites the rows' step, and clears their flags
+            simulation.reset(self._waiting, self._observations)
         rewards = simulation.read("reward")
-        rewards[waiting] = 0.0
+        rewards[self._waiting] = 0.0
         terminations, truncations = simulation.read("terminated", dtype=bool), simulation.read("truncated", dtype=bool)
-        over = terminations | truncations
-        if self.max_episode_steps < self.scenario.num_steps:
+        complete = ended = np.flatnonzero(terminations | truncations)
+        if self._is_cut:
             truncations |= simulation.read("step") >= self.max_episode_steps
-        infos = self._end(terminations | truncations, over)
-        return self._observations.copy(), rewards, terminations, truncations, infos
+            ended = np.flatnonzero(terminations | truncations)
+        finals = self._end(ended, complete) if len(ended) else {}
+        if self.autoreset_mode is not AutoresetMode.SAME_STEP:
+            self._waiting = ended
+        return self._observations.copy(), rewards, terminations, truncations, {**self._infos(), **finals}
 
-    def _check_ready(self, waiting: NDArray[np.intp]) -> None:
-        """Refuse a step without a reset before it."""
+    def _check_ready(self) -> None:
+        """Refuse a step that needs a reset before it."""
         if not self._keyed:
             raise gymnasium.error.ResetNeeded("step: call reset first")
-        if len(waiting) and self.autoreset_mode is AutoresetMode.DISABLED:
-            rows = reprlib.repr(waiting.tolist())
+        if len(self._waiting) and self.autoreset_mode is AutoresetMode.DISABLED:
+            rows = reprlib.repr(self._waiting.tolist())
             raise gymnasium.error.ResetNeeded(
                 f"step: rows {rows} have ended; reset them with options={{'{MASK_OPTION}': mask}}"
             )
 
-    def _end(self, ended: Flags, over: Flags) -> dict[str, Any]:
-        """Infos of a step, and what becomes of the rows that ended; those whose plan is `over` have totals."""
-        rows, totalled = np.flatnonzero(ended), np.flatnonzero(over)
-        if self.autoreset_mode is AutoresetMode.SAME_STEP:
-            finals = self._begin_next(rows, totalled) if len(rows) else {}
-            return {**self._infos(), **finals}
-        self._ended = ended
-        return {**self._infos(), **self._totals(totalled)}
+    def _end(self, ended: NDArray[np.intp], complete: NDArray[np.intp]) -> dict[str, Any]:
+        """Infos of rows that ended, those of a complete plan with its totals; with SAME_STEP they are reset."""
+        totals = self._totals(complete) if len(complete) else {}
+        return self._begin_next(ended, totals) if self.autoreset_mode is AutoresetMode.SAME_STEP else totals
 
     def _totals(self, rows: NDArray[np.intp]) -> dict[str, Any]:
-        """Totals of rows that flew to their episode's end, in Gymnasium's form; nothing if there are none."""
-        if not len(rows):
-            return {}
+        """Totals of rows that flew to their episode's end, in Gymnasium's form."""
         return self._spread({interface.TOTALS: self._spread(episode_metrics(self.simulation, rows), rows)}, rows)
 
-    def _begin_next(self, ended: NDArray[np.intp], totalled: NDArray[np.intp]) -> dict[str, Any]:
+    def _begin_next(self, ended: NDArray[np.intp], totals: dict[str, Any]) -> dict[str, Any]:
         """Reset the rows that ended; their last observations and infos, in Gymnasium's form."""
-        final_info = self._infos(ended) | self._totals(totalled)
+        final_info = self._infos(ended) | totals
         final_obs = np.full(self.num_envs, None, dtype=object)
         for row in ended.tolist():
             final_obs[row] = self._observations[row].copy()
@@ -223,6 +215,16 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
                 spread[name][rows] = value
             spread[f"_{name}"] = mask
         return spread
+
+
+def _check_arguments(num_envs: int, render_mode: str | None, max_episode_steps: int | None) -> None:
+    """Refuse no rows, a render mode, or no steps."""
+    if num_envs < 1:
+        raise ValueError(f"num_envs: must be at least 1, got {num_envs}")
+    if render_mode is not None:
+        raise ValueError(f"render_mode: the batched environment has none, got {render_mode!r}")
+    if max_episode_steps is not None and max_episode_steps < 1:
+        raise ValueError(f"max_episode_steps: must be at least 1, got {max_episode_steps}")
 
 
 def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:

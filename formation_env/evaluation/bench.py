@@ -10,7 +10,7 @@ from typing import Any, Final
 import gymnasium
 import pandas as pd
 
-from formation_env.task.loading import ENV_IDS
+from formation_env.registration import ENV_IDS
 
 REFERENCE: Final = "CartPole-v1"
 """The environment that the ratios refer to."""
@@ -97,11 +97,6 @@ def startup() -> dict[str, float]:
     )
     output = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     return dict(zip(("import", "first single step", "first batched step"), map(float, output.split()), strict=True))
-
-
-def learning() -> int:
-    """Run `agents bench`, which prints PPO's throughput, in a process of its own; returns its exit status."""
-    return subprocess.call([sys.executable, "-m", "agents", "bench"])
 
 
 def table(rows: int, envs: Sequence[str] = DEFAULT) -> pd.DataFrame:

@@ -1,4 +1,4 @@
-"""What a formation offers."""
+"""Interface of formations."""
 
 from abc import ABC, abstractmethod
 
@@ -13,21 +13,24 @@ from formation_env.orbital.orbit import Orbit
 
 
 class Formation(ABC):
-    """A relative orbit, given by its LVLH state at one instant."""
+    """A relative orbit, given by its LVLH state at one instant.
 
-    kind: str
+    Subclasses are made with `settings`; those that define their own `kind` can be registered.
+    """
+
+    kind: str = "custom"
 
     @abstractmethod
     def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
-        """LVLH state (6,), m and m/s, with which the formation begins at a time, s; it matters on an ellipse only."""
+        """LVLH state (6,), m and m/s, at the time at which the formation begins, s (it matters on an ellipse only)."""
 
     def reference(self, times_s: ArrayLike, orbit: Orbit, begin_s: float = 0.0) -> Array:
-        """The force-free Keplerian path through `state`, states (..., 6) at times (...), s, before and after it begins.
+        """States (..., 6) of the force-free Keplerian path through `state`, before and after the formation begins.
 
         Args:
             times_s: times (...), s.
-            orbit: the leader's.
-            begin_s: when the follower has `state`, s.
+            orbit: the leader's orbit.
+            begin_s: time at which the follower has `state`, s.
         """
         if orbit.eccentricity > 0:
             Phi = elliptic_transition_matrix(orbit, begin_s, times_s)

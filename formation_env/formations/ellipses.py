@@ -6,7 +6,8 @@ from typing import Literal
 from formation_env.formations.base import Formation, closed_ellipse
 from formation_env.numerics.arrays import Array
 from formation_env.orbital.orbit import Orbit
-from formation_env.settings import Real, settings
+from formation_env.quantities import Coordinate, VelocityComponent
+from formation_env.settings import settings
 
 
 @settings
@@ -19,8 +20,8 @@ class XYEllipse(Formation):
     """
 
     kind: Literal["xy_ellipse"] = "xy_ellipse"
-    x0_m: Real = 2000.0
-    vx0_m_s: Real = 0.0
+    x0_m: Coordinate = 2000.0
+    vx0_m_s: VelocityComponent = 0.0
 
     def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
         """LVLH state (6,), m and m/s."""
@@ -37,8 +38,8 @@ class SpaceCircle(Formation):
     """
 
     kind: Literal["space_circle"] = "space_circle"
-    x0_m: Real = 2000.0
-    vx0_m_s: Real = 0.2
+    x0_m: Coordinate = 2000.0
+    vx0_m_s: VelocityComponent = 0.2
 
     def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
         """LVLH state (6,), m and m/s."""
@@ -55,8 +56,8 @@ class ProjectedCircle(Formation):
     """
 
     kind: Literal["projected_circle"] = "projected_circle"
-    x0_m: Real = 0.0
-    vx0_m_s: Real = 1.0
+    x0_m: Coordinate = 0.0
+    vx0_m_s: VelocityComponent = 1.0
 
     def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
         """LVLH state (6,), m and m/s."""

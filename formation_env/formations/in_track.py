@@ -9,7 +9,8 @@ from formation_env.formations.base import Formation, need_circle
 from formation_env.numerics.arrays import Array
 from formation_env.orbital.constants import OMEGA_EARTH
 from formation_env.orbital.orbit import Orbit
-from formation_env.settings import Real, settings
+from formation_env.quantities import Coordinate
+from formation_env.settings import settings
 
 
 @settings
@@ -21,7 +22,7 @@ class InTrack(Formation):
     """
 
     kind: Literal["in_track"] = "in_track"
-    y0_m: Real = 2000.0
+    y0_m: Coordinate = 2000.0
 
     def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
         """LVLH state (6,), m and m/s: z = y0 (w_E / n) sin i cos nt."""

@@ -1,4 +1,4 @@
-"""The leader's own place, where missions start."""
+"""The leader's position, from which missions start."""
 
 from typing import Literal
 

@@ -8,7 +8,8 @@ from formation_env.formations.base import Formation, need_circle
 from formation_env.numerics.arrays import Array
 from formation_env.orbital.constants import MU_EARTH
 from formation_env.orbital.orbit import Orbit
-from formation_env.settings import Real, settings
+from formation_env.quantities import Coordinate
+from formation_env.settings import settings
 
 
 @settings
@@ -20,7 +21,7 @@ class Following(Formation):
     """
 
     kind: Literal["following"] = "following"
-    y0_m: Real = 2000.0
+    y0_m: Coordinate = 2000.0
 
     def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
         """LVLH state (6,), m and m/s: the leader's own motion, y0 / (r theta') seconds ahead of it."""
@@ -40,7 +41,7 @@ class Parallel(Formation):
     """
 
     kind: Literal["parallel"] = "parallel"
-    x0_m: Real = 1000.0
+    x0_m: Coordinate = 1000.0
 
     def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
         """LVLH state (6,), m and m/s."""

@@ -20,10 +20,8 @@ from formation_env.task.variants import draw_variants
 Rows = slice | NDArray[np.intp]
 """A selection of rows: a slice, or indices."""
 ALL_ROWS: Final = slice(None)
-RESULT_NAMES: Final = tuple(
-    name if size == 1 else f"{name}_{axis}" for name, (_, size) in field.STEP_RESULTS.items() for axis in "xyz"[:size]
-)
-"""Keys of `Simulation.first_row_results`; the components of a vector are NAME_x, NAME_y and NAME_z."""
+RESULT_PLACES: Final = {name: first for name, (first, _) in field.STEP_RESULTS.items()}
+"""Place of each named result, or of its first component, in `Simulation.first_row_results`."""
 _STATE_SLICES: Final = {
     name: slice(first * LANES, (first + size) * LANES, LANES) for name, (first, size) in field.STATES.items()
 }
@@ -144,9 +142,11 @@ class Simulation:
         """
         if name in field.STEP_RESULTS:
             first, size = field.STEP_RESULTS[name]
-            results = self._results[:, : self.num_rows]
-            chosen = results[first][rows] if size == 1 else results[first : first + size].T[rows]
-            return chosen.astype(dtype, copy=isinstance(rows, slice))
+            if size == 1:
+                scalars = self._results[first, : self.num_rows]
+                return (scalars if rows is ALL_ROWS else scalars[rows]).astype(dtype)
+            vectors = self._results[first : first + size, : self.num_rows].T
+            return vectors[rows].astype(dtype, order="C")
         if name not in field.STATES:
             raise KeyError(f"read: unknown name {name!r}; known: {', '.join((*field.STEP_RESULTS, *field.STATES))}")
         values: NDArray[Any] = self._state(*field.STATES[name], rows).astype(dtype, copy=False)
@@ -157,9 +157,10 @@ class Simulation:
         block = self._state(field.FIRST_TOTAL // LANES, field.NUM_TOTALS, rows).T
         return {name: block[first] for name, (first, _) in field.TOTALS.items()}
 
-    def first_row_results(self) -> dict[str, float]:
-        """Results of the first row's last step as Python numbers, by `RESULT_NAMES`; fast, for a single environment."""
-        return dict(zip(RESULT_NAMES, self._results[:, 0].tolist(), strict=True))
+    def first_row_results(self) -> list[float]:
+        """Results of the first row's last step as Python numbers, by `RESULT_PLACES`; fast, for a single env."""
+        values: list[float] = self._results[:, 0].tolist()
+        return values
 
     def first_row_state(self, name: str) -> Array:
         """Copy (size,) of a named part of the first row's state; fast, for a single environment."""

@@ -7,15 +7,16 @@ import numpy as np
 from formation_env.dynamics.spacecraft import Spacecraft
 from formation_env.numerics.arrays import Array
 from formation_env.orbital.orbit import Orbit
-from formation_env.settings import NonNegative, Text, settings
+from formation_env.quantities import Acceleration, Distance, Speed, ThrustNoise
+from formation_env.settings import Text, settings
 
 
 @settings
 class KalmanFilter:
-    """What the filter believes; each value left out is the truth's.
+    """Settings of the filter's model; each value left out equals the truth's.
 
     Attributes:
-        dynamics: name of its dynamics model.
+        dynamics: name of the linear dynamics model.
         sigma_pos_m: 1-sigma of the measured position, m.
         sigma_vel_m_s: 1-sigma of the measured velocity, m/s.
         process_noise_m_s2: 1-sigma of the random acceleration of each axis, held over a step, m/s^2.
@@ -27,19 +28,19 @@ class KalmanFilter:
     """
 
     dynamics: Text | None = None
-    sigma_pos_m: NonNegative | None = None
-    sigma_vel_m_s: NonNegative | None = None
-    process_noise_m_s2: NonNegative | None = None
-    thrust_noise: NonNegative | None = None
+    sigma_pos_m: Distance | None = None
+    sigma_vel_m_s: Speed | None = None
+    process_noise_m_s2: Acceleration | None = None
+    thrust_noise: ThrustNoise | None = None
     orbit: Orbit | None = None
     spacecraft: Spacecraft | None = None
-    initial_sigma_pos_m: NonNegative | None = None
-    initial_sigma_vel_m_s: NonNegative | None = None
+    initial_sigma_pos_m: Distance | None = None
+    initial_sigma_vel_m_s: Speed | None = None
 
 
 @dataclass(frozen=True)
 class FilterModel:
-    """`KalmanFilter` with the truth's value wherever it leaves one out."""
+    """The filter's model in full: `KalmanFilter` with the truth's value wherever it leaves one out."""
 
     dynamics: str
     sigma_pos_m: float

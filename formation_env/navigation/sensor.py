@@ -2,7 +2,8 @@
 
 from typing import Literal
 
-from formation_env.settings import NonNegative, settings
+from formation_env.quantities import Distance, Speed
+from formation_env.settings import settings
 
 
 @settings
@@ -16,5 +17,5 @@ class Sensor:
     """
 
     measures: Literal["position_and_velocity", "position"] = "position_and_velocity"
-    sigma_pos_m: NonNegative = 2.0
-    sigma_vel_m_s: NonNegative = 0.02
+    sigma_pos_m: Distance = 2.0
+    sigma_vel_m_s: Speed = 0.02

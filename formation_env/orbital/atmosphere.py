@@ -30,7 +30,7 @@ def exponential_density_kg_m3(
 
 
 def lifetime_s(altitude_m: float, density_kg_m3: float, scale_height_m: float, area_per_mass_m2_kg: float) -> float:
-    """Time in which drag brings a circular orbit down, by the estimate of `decayed_altitude_m`, s.
+    """Time in which drag brings a circular orbit down, by the estimate of `decayed_altitude_m`, s; inf without drag.
 
     Args:
         altitude_m: h(0), m.
@@ -40,7 +40,7 @@ def lifetime_s(altitude_m: float, density_kg_m3: float, scale_height_m: float, a
     """
     # da/dt = -rho v a C_d S / m = -rho sqrt(mu a) C_d S / m, of which the density alone is taken to vary
     sink_rate_m_s = density_kg_m3 * area_per_mass_m2_kg * math.sqrt(MU_EARTH * (R_EARTH + altitude_m))
-    return scale_height_m / sink_rate_m_s
+    return scale_height_m / sink_rate_m_s if sink_rate_m_s > 0 else math.inf
 
 
 def decayed_altitude_m(

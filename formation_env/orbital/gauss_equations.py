@@ -9,10 +9,10 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.integrate import solve_ivp
 
+from formation_env.numerics.integration import IntegrationError, integrate
 from formation_env.orbital.constants import MU_EARTH
-from formation_env.orbital.elements import Elements, to_cartesian, to_elements, unit
+from formation_env.orbital.elements import UNDEFINED, Elements, to_cartesian, to_elements, unit
 from formation_env.orbital.kepler import Array, elliptic
 
 Perturbation: TypeAlias = Callable[[float, Array, Array], ArrayLike]
@@ -43,7 +43,7 @@ def element_rates(elements: Elements, lvlh_accel_m_s2: ArrayLike) -> ElementRate
     """Rates of the classical elements under a perturbing acceleration (Ma 2009, eq. A.1-A.6; Vallado 2013, eq. 9-24).
 
     Args:
-        elements: with fields that broadcast to (...); neither circular nor equatorial.
+        elements: with fields that broadcast to (...); neither circular nor equatorial, see `elements.UNDEFINED`.
         lvlh_accel_m_s2: perturbing acceleration (..., 3), radial, along-track and normal, m/s^2.
 
     Raises:
@@ -51,7 +51,7 @@ def element_rates(elements: Elements, lvlh_accel_m_s2: ArrayLike) -> ElementRate
             `propagate_elements` works there too.
     """
     a, e, i, _, arg_perigee, nu = np.broadcast_arrays(*elements)
-    if not (np.all(elliptic(e) > 0) and np.all(np.sin(i) != 0)):
+    if not (np.all(elliptic(e) > UNDEFINED) and np.all(np.abs(np.sin(i)) > UNDEFINED)):
         raise ValueError("elements: a circular or equatorial orbit has no rates of its classical elements")
     fx, fy, fz = np.moveaxis(np.asarray(lvlh_accel_m_s2, float), -1, 0)
     n, root, cos, sin = np.sqrt(MU_EARTH / a**3), np.sqrt(1 - e**2), np.cos(nu), np.sin(nu)
@@ -93,11 +93,14 @@ def propagate_elements(
         Elements with fields of shape (..., T).
 
     Raises:
-        ValueError: an eccentricity outside [0, 1), at the start or on the way.
-        RuntimeError: the integrator gave up.
+        ValueError: times that do not increase, an eccentricity outside [0, 1), at the start or on the way, or a force
+            that is not finite or so strong that the motion cannot be integrated.
     """
+    times = np.asarray(times_s, float)
+    if times.ndim != 1 or not np.isfinite(times).all() or (np.diff(times) <= 0).any():
+        raise ValueError(f"times_s: must be finite and increasing with shape (T,), got {times}")
     position, velocity = to_cartesian(elements)
-    start, times = _vectors(position, velocity), np.asarray(times_s, float)
+    start = _vectors(position, velocity)
 
     def rates(time_s: float, state: Array) -> Array:
         return _vector_rates(state.reshape(start.shape), time_s, perturbation).ravel()
@@ -105,12 +108,20 @@ def propagate_elements(
     # each vector is known to rtol of its own length; the eccentricity vector's scale is one
     scale = np.broadcast_to(np.linalg.norm(start, axis=-1, keepdims=True), start.shape).copy()
     scale[1] = 1.0
-    flight = solve_ivp(
-        rates, (times[0], times[-1]), start.ravel(), "DOP853", t_eval=times, rtol=rtol, atol=(rtol * scale).ravel()
-    )
-    if not flight.success:
-        raise RuntimeError(f"propagate_elements: {flight.message}")
-    path: Array = np.moveaxis(flight.y.reshape(*start.shape, -1), -1, -2)
+    shortest_m = float(np.min(elements.semi_major_axis_m, initial=np.inf))
+    try:
+        flight = integrate(
+            rates,
+            start.ravel(),
+            times,
+            start_s=float(times[0]) if len(times) else 0.0,
+            period_s=2 * np.pi * np.sqrt(shortest_m**3 / MU_EARTH),
+            rtol=rtol,
+            atol=(rtol * scale).ravel(),
+        )
+    except IntegrationError as error:
+        raise ValueError(f"perturbation: the motion cannot be integrated: {error}") from None
+    path: Array = np.moveaxis(flight.T.reshape(*start.shape, len(times)), -1, -2)
     return to_elements(*_cartesian(path))
 
 

@@ -49,19 +49,18 @@ class Moment:
 
 def read_moment(simulation: Simulation) -> Moment:
     """The present moment of the simulation's first row."""
-    results, state = simulation.first_row_results(), simulation.first_row_state
+    state = simulation.first_row_state
     xx, xy, yy = state("covariance_in_plane")[[0, 1, 4]]
     zz = state("covariance_cross_track")[0]
-    thrust = np.array([results["thrust_x"], results["thrust_y"], results["thrust_z"]])
     return Moment(
         step=int(state("step")[0]),
         truth=state("true_state")[:3],
         estimate=state("estimate")[:3],
         covariance=np.array([[xx, xy, 0], [xy, yy, 0], [0, 0, zz]]),
-        thrust=thrust / simulation.first_row_scenario.spacecraft.max_accel_m_s2,
-        measured=results["measured"] > 0.5,
+        thrust=simulation.read("thrust")[0] / simulation.first_row_scenario.spacecraft.max_accel_m_s2,
+        measured=bool(simulation.read("measured", dtype=bool)[0]),
         age_s=float(state("measurement_age")[0]),
-        position_error_m=results["position_error"],
+        position_error_m=float(simulation.read("position_error")[0]),
         delta_v_m_s=float(state("sum_delta_v")[0]),
     )
 
@@ -74,8 +73,8 @@ class Trail:
 
     def record(self, simulation: Simulation) -> None:
         """Add the present position of the simulation's first row."""
-        lost = simulation.first_row_results()["measured"] < 0.5
-        self._points.append((simulation.first_row_state("true_state")[:3], lost))
+        received = bool(simulation.read("measured", dtype=bool)[0])
+        self._points.append((simulation.first_row_state("true_state")[:3], not received))
 
     def clear(self) -> None:
         """Begin a new episode's trail."""

@@ -49,7 +49,7 @@ _PHASE_LEFT_PX: Final = 152
 
 
 class Scene:
-    """The picture of a scenario, drawn again and again.
+    """The picture of a scenario, redrawn for each frame.
 
     Axes, grids, headings and the reference path are drawn once per phase and kept; a frame puts what moves on top.
     """
@@ -87,7 +87,7 @@ class Scene:
         return self._text(left, 466, 10.5, weight="bold")
 
     def _write_titles(self) -> None:
-        """The scenario's title, the views' and the legend, which is one line below the views."""
+        """Write the titles of scenario and views, and the legend below the views."""
         title = self._scenario.title
         self._text(18, 518, 13 * min(1, TITLE_CHARACTERS / max(len(title), 1)), title, weight="bold")
         for view, (*_, name) in zip(self._views, _VIEWS, strict=True):
@@ -120,10 +120,10 @@ class Scene:
         self._background = self._canvas.copy_from_bbox(self._figure.bbox)
 
     def draw(self, moment: Moment, trail: Array, lost: NDArray[np.bool_]) -> Frame:
-        """The picture of a moment.
+        """Draw a moment.
 
         Args:
-            moment: what to show.
+            moment: the moment.
             trail: the follower's positions (points, 3), m.
             lost: whether the measurement was lost at each of them (points,).
 
@@ -143,7 +143,7 @@ class Scene:
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
     def _keep_up(self, moment: Moment) -> None:
-        """A new background for a new phase, and when the follower has left the views: they double."""
+        """Draw a new background for a new phase, or views of twice the width if the follower has left them."""
         distance_m = float(np.abs(moment.truth - self._plan.centre).max())
         doublings = np.ceil(np.log2(max(distance_m / self._half_m, 1.0)))
         if doublings > 0 or self._shown != _stage(self._plan.leg(moment.step), moment.step):
@@ -168,7 +168,7 @@ class Scene:
         ]
 
     def _show_link(self, moment: Moment) -> None:
-        """A frame and a badge while measurements are lost."""
+        """Show the link's badge, and a red frame while measurements are lost."""
         self._border.set_visible(not moment.measured)
         text = "LINK UP" if moment.measured else f"LINK LOST  {moment.age_s:.0f} s"
         fill, edge, color = ("white", GREY, GREY) if moment.measured else (RED, RED, "white")
@@ -181,5 +181,5 @@ def _readable(value: float, decimals: int) -> str:
 
 
 def _stage(leg: Leg, step: int) -> tuple[int, bool]:
-    """Which phase, and whether the follower is on its way."""
+    """Index of the phase, and whether the follower is in its transfer."""
     return leg.index, step < leg.arrival

@@ -1,4 +1,4 @@
-"""One projection of the scene onto axes, and how its parts look."""
+"""A projection of the scene onto axes, and the styles of its parts."""
 
 from typing import Any, Final
 
@@ -31,9 +31,9 @@ STYLES: Final[dict[str, dict[str, Any]]] = {
     "ellipse": {"color": PURPLE, "lw": 1.4},
     "estimate": {"color": PURPLE, "marker": "x", "ls": "", "ms": 6, "mew": 1.8, "label": f"estimate, {SIGMAS:g}σ"},
 }
-"""What is drawn in every view, from back to front."""
+"""Styles of the lines of every view, from back to front."""
 STILL: Final = ("path", "leader")
-"""What does not move, except in a close-up."""
+"""Lines that do not move, except in a close-up."""
 
 
 class View:
@@ -66,7 +66,7 @@ class View:
         axes.set_axisbelow(True)
 
     def prepare(self, centre: Array, half_m: float, path: Array) -> None:
-        """Set what stays for a while.
+        """Set limits, labels and the reference path of the present phase.
 
         Args:
             centre: position in the middle (3,), m.
@@ -84,10 +84,10 @@ class View:
         self._place({"path": self._path, "leader": np.zeros((1, 2))}, np.zeros(2))
 
     def show(self, moment: Moment, reference: Array, trail: Array, lost: NDArray[np.bool_], tolerance_m: float) -> None:
-        """Move what moves.
+        """Move the lines to a moment.
 
         Args:
-            moment: what to show.
+            moment: the moment.
             reference: position (3,), m.
             trail: the follower's positions (points, 3), m.
             lost: whether the measurement was lost at each of them (points,).
@@ -133,6 +133,6 @@ def _circle() -> Array:
 
 
 def _arrow_lengths(thrust: Array) -> Array:
-    """Thrust (3,), 1 is full, with the square root of its length, so that a small one is seen."""
+    """Thrust (3,), full at 1, scaled to the square root of its length, so that small thrusts show."""
     size = float(np.linalg.norm(thrust))
     return thrust / np.sqrt(size) if size > 0 else thrust

@@ -1,17 +1,12 @@
-"""Domain randomization: what differs from episode to episode, and the scenarios that it may come to."""
+"""Domain randomization: quantities that differ from episode to episode, and their samples."""
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, Annotated, Final, TypeVar
+from typing import Annotated, Final
 
 import numpy as np
 from pydantic import AfterValidator, Field, Strict
 
 from formation_env.settings import NonNegative, Positive, settings
-
-if TYPE_CHECKING:
-    pass
-
-T = TypeVar("T")
 
 
 def _ordered(pair: tuple[float, float]) -> tuple[float, float]:
@@ -26,17 +21,17 @@ PositiveRange = Annotated[tuple[Positive, Positive], AfterValidator(_ordered)]
 
 @settings
 class DomainRandomization:
-    """What differs from episode to episode: ranges [low, high], each a scenario's quantity or a factor of it.
+    """Ranges [low, high] of the quantities that differ from episode to episode, absolute or as factors.
 
-    As many complete scenarios as asked for, the variants, are drawn once; each episode flies one of them, all equally
-    likely. The ranges are covered evenly (Latin hypercube: McKay, Beckman & Conover 1979). What is left out stays as it
-    is. The filter knows of the changes as far as `filter` leaves it to the truth.
+    Complete scenarios, the variants, are drawn once; each episode flies one of them, all equally likely. The ranges are
+    covered evenly (Latin hypercube: McKay, Beckman & Conover 1979). A quantity left out keeps its nominal value. The
+    filter's model follows the variant except where `filter` fixes a value.
 
     Attributes:
-        variants: how many scenarios are drawn.
-        seed: of the drawing.
+        variants: number of scenarios that are drawn.
+        seed: seed of the draw.
         formation_size_factor: of the lengths and velocities of all formations, the start's included.
-        start_spread_factor: of the spread of the start.
+        start_spread_factor: of start.initial_sigma_pos_m and initial_sigma_vel_m_s.
         sensor_noise_factor: of the sensor's sigmas.
         process_noise_factor: of process_noise_m_s2.
         outage_length_factor: of dropout.mean_outage_s.
@@ -44,7 +39,7 @@ class DomainRandomization:
         loss_probability_factor: of dropout.loss_probability.
         max_accel_factor: of the follower's thrust limit.
         ballistic_coefficient_factor: of the follower's m / (C_d S), by its drag coefficient; the leader's stays.
-        altitude_m: the leader's altitude, m; so the period and the number of steps differ, too.
+        altitude_m: the leader's altitude, m; period and number of steps follow from it.
         inclination_deg: the leader's inclination, deg.
     """
 
@@ -64,15 +59,15 @@ class DomainRandomization:
 
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """What is varied, and between which limits."""
-        found = {name: getattr(self, name) for name in QUANTITIES}
-        return {name: ends for name, ends in found.items() if ends is not None}
+        """Range of each quantity that varies."""
+        ranges = {name: getattr(self, name) for name in QUANTITIES}
+        return {name: ends for name, ends in ranges.items() if ends is not None}
 
     def draw(self) -> list[dict[str, float]]:
-        """The varied quantities of each variant."""
+        """Values of the varying quantities, of each variant."""
         generator = np.random.default_rng(self.seed)
         cells = np.tile(np.arange(self.variants), (len(QUANTITIES), 1))
-        # each of as many equal cells of a range has one variant, somewhere in it
+        # each range has as many equal cells as there are variants, and one variant somewhere in each cell
         shares = (generator.permuted(cells, axis=1) + generator.random(cells.shape)) / self.variants
         columns = {name: shares[QUANTITIES.index(name)].tolist() for name in self.ranges}
         return [

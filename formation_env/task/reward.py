@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_env.numerics.arrays import Array
-from formation_env.settings import NonNegative, Positive, settings
+from formation_env.quantities import ErrorScale, ErrorWeight
+from formation_env.settings import settings
 
 
 @dataclass(frozen=True)
@@ -54,10 +55,10 @@ class Reward:
         quadratic_scale_m: error at which both forms cost the same, m.
     """
 
-    error_weight: NonNegative = 0.01
-    transfer_error_weight: NonNegative = 0.0
+    error_weight: ErrorWeight = 0.01
+    transfer_error_weight: ErrorWeight = 0.0
     error_cost: Literal["linear", "quadratic"] = "linear"
-    quadratic_scale_m: Positive = 100.0
+    quadratic_scale_m: ErrorScale = 100.0
 
     def cost(self) -> ErrorCost:
         """Cost of an error per unit of its weight."""
@@ -73,7 +74,7 @@ class Reward:
 
 @dataclass(frozen=True)
 class Scoring:
-    """How the position error at each instant (num_steps + 1,) is scored, by the step that ends there.
+    """Scoring of the position error at each instant (num_steps + 1,), by the step that ends there.
 
     Attributes:
         leg: index of the phase that the step belongs to; no step ends at instant 0, whose error is reported by phase 0.

@@ -69,7 +69,7 @@ def leg_reference(scenario: Scenario, leg: Leg, steps: ArrayLike) -> Array:
 
 
 def score_table(scenario: Scenario) -> Scoring:
-    """How the error at each instant is scored."""
+    """Scoring of the error at each instant."""
     plan = legs(scenario)
     return scoring(scenario.reward, [leg.arrival for leg in plan], [leg.end for leg in plan], scenario.dt_s)
 

@@ -2,61 +2,54 @@
 
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
-from pydantic import ValidationError
-
-from formation_env.settings import faults
-from formation_env.task.randomization import QUANTITIES, T
+from formation_env.settings import ConfigError, faults_of
+from formation_env.task.checks import check_memory
+from formation_env.task.randomization import QUANTITIES
 from formation_env.task.scenario import Scenario
 
-MAX_VARIANT_STEPS: Final = 500_000
-"""Of all variants together; their plans are kept as tables, of about 400 bytes for each."""
-
+T = TypeVar("T")
 
 _OF_DROPOUT: Final = {
     "outage_length_factor": "mean_outage_s",
     "outage_spacing_factor": "mean_uptime_orbits",
     "loss_probability_factor": "loss_probability",
 }
-"""Quantities of the dropout model, and their names there; no model has them all."""
+"""Quantities of the dropout model, and their keys there; no model has all of them."""
 
 
 @lru_cache(maxsize=16)
 def draw_variants(scenario: Scenario) -> tuple[Scenario, ...]:
-    """What episodes of a scenario fly: complete scenarios without randomization, or it alone if it has none.
+    """Draw the scenarios that episodes fly, none of them randomized; without randomization it is the scenario alone.
 
     Raises:
-        ValueError: a range does not fit the scenario, or what is drawn makes no valid one; one line that names it.
+        ValueError: a range does not fit the scenario, or a variant is invalid; one line that names key and value.
     """
-    wanted = scenario.domain_randomization
-    if wanted is None:
+    randomization = scenario.domain_randomization
+    if randomization is None:
         return (scenario,)
-    steps = wanted.variants * scenario.num_steps
-    if steps > MAX_VARIANT_STEPS:
-        raise ValueError(
-            f"domain_randomization.variants: must have at most {MAX_VARIANT_STEPS} steps together, got {steps}"
-        )
+    check_memory(scenario, randomization.variants, "domain_randomization.variants")
     for name, key in _OF_DROPOUT.items():
-        if name in wanted.ranges and not hasattr(scenario.dropout, key):
+        if name in randomization.ranges and not hasattr(scenario.dropout, key):
             raise ValueError(f"domain_randomization.{name}: dropout {scenario.dropout.kind} has no {key}")
-    for name, ends in wanted.ranges.items():
+    for name, ends in randomization.ranges.items():
         for end in ends:
             _vary(scenario, {name: end})
-    return tuple(_vary(scenario, values) for values in wanted.draw())
+    return tuple(_vary(scenario, values) for values in randomization.draw())
 
 
 def _vary(scenario: Scenario, values: dict[str, float]) -> Scenario:
-    """The scenario with some quantities changed, and no randomization."""
+    """Change some quantities of a scenario, and remove its randomization."""
     try:
         return replace(scenario, domain_randomization=None, **_parts(scenario, values))
-    except ValidationError as error:
-        what = ", ".join(f"{name} {value:.4g}" for name, value in values.items())
-        raise ValueError(f"domain_randomization: {what}: {'; '.join(faults(error))}") from None
+    except ConfigError as error:
+        drawn = ", ".join(f"{name} {value:.4g}" for name, value in values.items())
+        raise ValueError(f"domain_randomization: {drawn}: {faults_of(error)}") from None
 
 
 def _parts(scenario: Scenario, values: dict[str, float]) -> dict[str, Any]:
-    """The parts of a scenario that depend on the quantities, changed."""
+    """Fields of the changed scenario that depend on the quantities."""
     factor = dict.fromkeys(QUANTITIES, 1.0) | values
     orbit, craft, dropout = scenario.orbit, scenario.spacecraft, scenario.dropout
     size, own_drag = factor["formation_size_factor"], "ballistic_coefficient_factor" in values
@@ -82,10 +75,10 @@ def _parts(scenario: Scenario, values: dict[str, float]) -> dict[str, Any]:
 
 
 def _resized(formation: T, factor: float) -> T:
-    """A formation with its lengths and velocities multiplied."""
+    """Multiply the lengths and velocities of a formation."""
     return _scaled(formation, factor, tuple(key for key in vars(formation) if key.endswith(("_m", "_m_s"))))
 
 
 def _scaled(part: T, factor: float, keys: tuple[str, ...]) -> T:
-    """A part of a scenario with some of its numbers multiplied."""
+    """Multiply some numbers of a part of a scenario."""
     return replace(part, **{key: factor * getattr(part, key) for key in keys})  # type: ignore[type-var]

@@ -2,6 +2,8 @@
 
 import dataclasses
 import math
+import pickle
+import re
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,6 +12,7 @@ import pytest
 from formation_env.dropout import AnyDropout, Windows
 from formation_env.formations import AnyFormation, Following, Parallel
 from formation_env.settings import (
+    MAX_FAULT_LINES,
     ConfigError,
     Flag,
     NonNegative,
@@ -18,6 +21,7 @@ from formation_env.settings import (
     Real,
     Text,
     build,
+    faults_of,
     load_yaml,
     nearest,
     settings,
@@ -205,7 +209,7 @@ def test_yaml_numbers_that_are_not_finite_are_refused(tmp_path: Path, text: str)
         ("a: 1\n\tb: 2", "line 2: no valid YAML: found character '\\t' that cannot start any token"),
         ("a: *b", "line 1: no valid YAML: found undefined alias 'b'"),
         ("a: 1\n---\na: 2", "line 2: no valid YAML: but found another document"),
-        ("a: 2020-13-45", "no valid YAML: month must be in 1..12"),
+        ("a: 2020-13-45", "line 1: no valid YAML: '2020-13-45' is no timestamp: month must be in 1..12"),
     ],
 )
 def test_broken_yaml(tmp_path: Path, text: str, fault: str) -> None:
@@ -242,3 +246,59 @@ def test_nearest() -> None:
     """The closest known name, or all of them, sorted, when none is close."""
     assert nearest("following", ["parallel", "followin"]) == "did you mean 'followin'?"
     assert nearest("q", ["b", "a"]) == "known: a, b"
+
+
+@pytest.mark.parametrize(
+    ("make", "fault"),
+    [
+        (lambda: Lamp(power_w=-1.0), "Lamp: power_w: must be greater than 0, got -1.0"),
+        (lambda: Lamp(lit=1), "Lamp: lit: must be a valid boolean, got 1"),
+        (lambda: Lamp(power=1.0), r"Lamp: power: unknown key; did you mean 'power_w'\?"),
+        (lambda: Room(), "Room: name: required but missing"),
+        (lambda: Room(name="", lamp={"share": 2}), "Room: lamp.share: must be less than or equal to 1, got 2"),
+        (lambda: Room(name="", formation={"kind": "paralel"}), "Room: formation.kind: unknown kind 'paralel'; did .*"),
+        (lambda: Room(name="", formation=Windows()), r"Room: formation: must be a mapping with a kind \(.*\), got W.*"),
+        (lambda: Room(name="", slope=10**400), "Room: slope: must be a .*, got an integer of 1329 bits"),
+        (lambda: dataclasses.replace(Lamp(), share=2.0), "Lamp: share: must be less than or equal to 1, got 2.0"),
+        (lambda: Parallel(x0_m="1"), "Parallel: x0_m: must be a valid number, got the string '1'"),
+    ],
+    ids=range(10),
+)
+def test_constructors_say_what_files_say(make: Any, fault: str) -> None:
+    """One line per fault, with the class in the file's place, and no word of pydantic."""
+    with pytest.raises(ConfigError) as caught:
+        make()
+    assert re.fullmatch(fault, str(caught.value)), str(caught.value)
+    assert caught.value.__suppress_context__
+    assert str(pickle.loads(pickle.dumps(caught.value))) == str(caught.value)
+
+
+def test_of_many_faults_the_first_are_named() -> None:
+    """6000 bad windows: a screenful, and how many more there are."""
+    windows = [{"start_s": -1, "duration_s": 1}] * 6000
+    with pytest.raises(ConfigError) as caught:
+        build(Room, {"name": "", "dropout": {"kind": "windows", "windows": windows}}, "x.yaml")
+    lines = str(caught.value).splitlines()
+    assert len(lines) == MAX_FAULT_LINES + 1
+    assert lines[0] == "x.yaml: dropout.windows.0.start_s: must be greater than or equal to 0, got -1"
+    assert lines[-1] == f"x.yaml: and {6000 - MAX_FAULT_LINES} more faults"
+
+
+def test_aliased_values_are_cut_before_they_are_written_out() -> None:
+    """Thirty doublings of a list would fill the memory when written out."""
+    value: list[Any] = [1, 2]
+    for _ in range(30):
+        value = [value, value]
+    with pytest.raises(ConfigError) as caught:
+        build(Room, {"name": "", "slope": value}, "x.yaml")
+    assert str(caught.value).startswith("x.yaml: slope: must be a valid number, got [[[[...], [...]], [")
+    assert len(str(caught.value)) < 150
+
+
+def test_faults_without_their_place() -> None:
+    """For errors about what several files or values led to."""
+    with pytest.raises(ConfigError) as caught:
+        Lamp(power_w=-1.0, share=2.0)
+    assert faults_of(caught.value) == (
+        "power_w: must be greater than 0, got -1.0; share: must be less than or equal to 1, got 2.0"
+    )

@@ -6,12 +6,13 @@ from typing import Any
 import numpy as np
 from typer.testing import CliRunner
 
-from agents.__main__ import MISTAKE, app
+from agents.cli import app
 from agents.policy.actor import Actor, Functions
 from agents.training.checkpoint import load_checkpoint
 from agents.training.run_folder import CHECKPOINT, Run, load_run
 from agents.training.run_settings import plan_run
 from formation_env import load_scenario
+from formation_env.cli_errors import WRONG_INPUT
 from formation_env.task.observation import SIZE
 
 SCENARIO = """
@@ -57,9 +58,9 @@ def random_actor(squash: str, activation: str = "tanh", power: float = 2.0, widt
     return Actor(layers, Functions(activation, squash, power, 50.0), load_scenario("keeping"))
 
 
-def assert_refused(arguments: list[str], fault: str) -> None:
-    """The command says so in one line."""
+def assert_refused(arguments: list[str], fault: str, last: bool = False) -> None:
+    """The command says so in one line; with `last`, after others."""
     result = CliRunner().invoke(app, arguments)
-    assert result.exit_code == MISTAKE
+    assert result.exit_code == WRONG_INPUT
     assert fault in result.stderr
-    assert result.stderr.count("\n") == 1
+    assert last or result.stderr.count("\n") == 1

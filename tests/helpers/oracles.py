@@ -35,6 +35,41 @@ def random_covariance(rng: np.random.Generator, size: int) -> Array:
     return root @ root.T + np.eye(size)
 
 
+def regulator_cost(Phi: Array, Gamma: Array, Q: Array, R: Array) -> Array:
+    """Cost-to-go (m, m) of the infinite horizon, by doubling (Chu, Fan, Lin & Wang 2004): matrix inverses only.
+
+    scipy's solver reorders eigenvalues, which in SI units fails under some processors' BLAS.
+
+    Args:
+        Phi: transition matrix (m, m).
+        Gamma: input matrix (m, k).
+        Q: state weight (m, m).
+        R: control weight (k, k).
+    """
+    A, G, H = Phi, Gamma @ np.linalg.solve(R, Gamma.T), Q
+    for _ in range(60):
+        W = np.eye(len(A)) + G @ H
+        inverse_A, inverse_G = np.linalg.solve(W, A), np.linalg.solve(W, G)
+        step = A.T @ H @ inverse_A
+        A, G, H = A @ inverse_A, G + A @ inverse_G @ A.T, H + step
+        G, H = (G + G.T) / 2, (H + H.T) / 2
+        if np.abs(step).max() <= 1e-15 * np.abs(H).max():
+            return H
+    raise AssertionError("the doubling did not converge")
+
+
+def filter_covariance(Phi: Array, push: Array, H: Array, R_noise: Array) -> Array:
+    """Stationary covariance (6, 6) before a measurement; the filter is the regulator's dual (Ma 2009, eq. 4.71).
+
+    Args:
+        Phi: transition matrix (6, 6).
+        push: effect (6, k) of process noises of 1 sigma over a step.
+        H: measurement matrix (m, 6).
+        R_noise: covariance (m, m) of the measurement.
+    """
+    return regulator_cost(Phi.T, H.T, push @ push.T, R_noise)
+
+
 def fly_under_j2(revolutions: int, inclination_rad: float, radius_m: float) -> tuple[Array, Array]:
     """Integrate a leader, circular at t = 0, in Cartesian ECI with point mass and J2 (Vallado, section 8.6.1).
 

@@ -1,1 +1,1 @@
-"""The source thesis's claims, each tested on flights."""
+"""Claims of the source thesis, each tested on simulated flights."""

@@ -1,4 +1,4 @@
-"""A sentence of the thesis, and what became of it."""
+"""A statement of the thesis and its verdict."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args

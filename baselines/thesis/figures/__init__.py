@@ -1,4 +1,4 @@
-"""The figures of chapters 3 and 5. To add one: a function below or beside, and a line in `FIGURES`."""
+"""Figures of chapters 3 and 5. To add one: a drawing function, and an entry in `FIGURES`."""
 
 from baselines.thesis.figures.registry import FIGURES, Figure
 

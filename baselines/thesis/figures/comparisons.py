@@ -11,7 +11,8 @@ from matplotlib.colors import Colormap
 from matplotlib.figure import Figure
 
 from baselines.thesis.figures import style
-from baselines.thesis.flights import Flights, whole_periods
+from baselines.thesis.flight_recorder import whole_periods
+from baselines.thesis.recorded_flights import Flights
 from formation_env.numerics.arrays import Array
 
 PERIODS = "Time [period]"
@@ -42,13 +43,13 @@ class Course:
         return whole_periods(self.flights.scenario)
 
     def so_far(self, quantity: str) -> Array:
-        """One of `mean_error`, `max_error` and `delta_v` of `Flights`, up to each period (periods,)."""
+        """`mean_error`, `max_error` or `delta_v` of `Flights` up to each period (periods,)."""
         values = [getattr(self.flights, quantity)(end)[self.policy].mean() for end in self.periods]
         return np.array(values)
 
 
 def against_transfer_time(flown: Mapping[float, Flights], color: str) -> Figure:
-    """Greatest and mean error and control of one policy against the transfer time in periods."""
+    """Maximum and mean error and control of one policy against the transfer time in periods."""
     figure = style.sheet(5.0)
     errors, controls = figure.subplots(2, 1)
     times = sorted(flown)
@@ -96,7 +97,7 @@ def trade(flights: Flights, weights: Sequence[int], periods: Sequence[int]) -> F
 
 
 def over_time(courses: Sequence[Course]) -> Figure:
-    """Greatest and mean error, and consumption, up to each period."""
+    """Maximum and mean error, and consumption, up to each period."""
     figure = style.sheet(5.4)
     errors, spent = figure.subplots(2, 1)
     for course in courses:
@@ -115,7 +116,7 @@ def over_time(courses: Sequence[Course]) -> Figure:
 
 
 def whole_numbers(axes: Axes) -> None:
-    """A tick at each whole period."""
+    """Put a tick at each whole period."""
     low, high = axes.get_xlim()
     axes.set_xticks(np.arange(np.ceil(low), np.floor(high) + 1))
 

@@ -1,22 +1,27 @@
-"""What the figures of chapter 5 take from the flights of `baselines.thesis.plan`."""
+"""Drawings of the figures of chapter 5 from the flights of `baselines.thesis.figure_flights`."""
 
 from collections.abc import Callable, Mapping
 
 from matplotlib.figure import Figure
 
-from baselines.thesis import plan
+from baselines.thesis import figure_flights
 from baselines.thesis.figures import comparisons, panels, paths, style
 from baselines.thesis.figures.comparisons import Course
 from baselines.thesis.figures.panels import Line
-from baselines.thesis.flights import Flights, whole_periods
+from baselines.thesis.flight_recorder import whole_periods
+from baselines.thesis.recorded_flights import Flights
 
 Flown = Mapping[str, Flights]
 Draw = Callable[[Flown], Figure]
 
-LQR, FINER, SMC = (plan.KEEPING.index(law) for law in (plan.LQR, plan.FINER, plan.SMC))
-FAILED_LQR, FAILED_SMC = (plan.FAILURE.index(law) for law in (plan.LQR, plan.SMC))
-MEANT_LQR, MEANT_TRACKING = (plan.MEANT.index(law) for law in (plan.LQR, plan.TRACKING))
-WEIGHTS = [plan.KEEPING.index(law) for law in plan.WEIGHTS]
+LQR, TIGHTER, SMC = (
+    figure_flights.KEEPING.index(law) for law in (figure_flights.LQR, figure_flights.TIGHTER, figure_flights.SMC)
+)
+FAILED_LQR, FAILED_SMC = (figure_flights.FAILURE.index(law) for law in (figure_flights.LQR, figure_flights.SMC))
+CORRECTED_LQR, CORRECTED_TRACKING = (
+    figure_flights.CORRECTED.index(law) for law in (figure_flights.LQR, figure_flights.TRACKING)
+)
+WEIGHTS = [figure_flights.KEEPING.index(law) for law in figure_flights.WEIGHTS]
 BLUE, RED, SKY = (style.COLORS[name] for name in ("lqr", "smc", "lqr_quasi_static"))
 
 
@@ -30,7 +35,7 @@ def keeping(flown: Flown) -> Figure:
     return panels.four_panels(
         [
             Line("LQR, k as printed", flown["keeping"], LQR, BLUE),
-            Line("LQR, k with its n", flown["meant"], MEANT_LQR, "black", "--"),
+            Line("LQR, k with its n", flown["corrected"], CORRECTED_LQR, "black", "--"),
         ]
     )
 
@@ -49,7 +54,7 @@ def weights(flown: Flown) -> Figure:
     """Consumption against accuracy of all LQR weights."""
     flown_periods = whole_periods(flown["keeping"].scenario)
     return comparisons.trade(
-        flown["keeping"], WEIGHTS, [time for time in plan.KEEPING_PERIODS if time in flown_periods]
+        flown["keeping"], WEIGHTS, [time for time in figure_flights.KEEPING_PERIODS if time in flown_periods]
     )
 
 
@@ -64,7 +69,7 @@ def with_and_without_failure(flown: Flown) -> Figure:
 
 
 def nearest_lqr(keeping: Flights) -> Course:
-    """Of all LQR weights flown on the space circle, the one whose mean error is nearest to SMC's."""
+    """LQR whose mean error on the space circle is nearest to SMC's."""
     means = keeping.mean_error().mean(axis=1)
     policy = min(WEIGHTS, key=lambda index: abs(means[index] - means[SMC]))
     return Course("LQR of nearest mean accuracy", keeping, policy, BLUE, "o")

@@ -1,4 +1,4 @@
-"""What came out: a sentence or two below a figure, with the numbers of the flights behind it."""
+"""Outcome of each figure in a sentence or two, with the numbers of its flights."""
 
 from collections.abc import Callable
 from typing import Final
@@ -6,47 +6,47 @@ from typing import Final
 import numpy as np
 
 from baselines.report.words import number
-from baselines.thesis import plan
+from baselines.thesis import figure_flights
 from baselines.thesis.figures.drawings import (
+    CORRECTED_LQR,
+    CORRECTED_TRACKING,
     FAILED_LQR,
     FAILED_SMC,
-    FINER,
     LQR,
-    MEANT_LQR,
-    MEANT_TRACKING,
     SMC,
+    TIGHTER,
     Flown,
 )
-from baselines.thesis.flights import Flights
+from baselines.thesis.recorded_flights import Flights
 
 MEASUREMENTS: Final = "At a sigma of 2 m the measurements lie on the true position. "
 READING: Final = "On the dynamics as printed, k of eq. (2.62) without its n, "
 
 
 def _accel(flights: Flights, policy: int) -> str:
-    """Greatest acceleration, mean over the seeds, in words."""
+    """Text of the maximum acceleration, mean over the seeds."""
     return f"{1e3 * flights.max_accel()[policy].mean():.3g} mm/s²"
 
 
 def _mean(flights: Flights, policy: int) -> str:
-    """Mean error, mean over the seeds, in words."""
+    """Text of the mean error, mean over the seeds."""
     return f"{number(flights.mean_error()[policy].mean())} m"
 
 
 def _max(flights: Flights, policy: int) -> str:
-    """Greatest error, mean over the seeds, in words."""
+    """Text of the maximum error, mean over the seeds."""
     return f"{number(flights.max_error()[policy].mean())} m"
 
 
 def _spent(flights: Flights, policy: int) -> str:
-    """Delta-v, mean over the seeds, in words."""
+    """Text of the delta-v, mean over the seeds."""
     return f"{number(flights.delta_v()[policy].mean())} m/s"
 
 
 def _in_track(flown: Flown) -> str:
     return (
-        "Eq. (3.7-3.9) are of first order in the Earth's rate over the orbit's: the tracks coincide but for 3 % of "
-        "what the following formation of the same separation misses."
+        "Eq. (3.7-3.9) are of first order in the ratio of the Earth's rate to the orbit's: the ground tracks coincide "
+        "to 3 % of the miss of the following formation with the same separation."
     )
 
 
@@ -55,7 +55,7 @@ def _initialization(periods: str, printed: str) -> Callable[[Flown], str]:
         flights = flown[f"initialization {periods}"]
         return (
             f"The trajectory-following regulator errs by {_max(flights, 0)} at most, with {_accel(flights, 0)}; "
-            f"{printed}. The error is the lag of eq. (4.19), which takes the moving desired state as constant."
+            f"{printed}. The error is the lag of eq. (4.19), which treats the moving desired state as constant."
         )
 
     return note
@@ -64,9 +64,9 @@ def _initialization(periods: str, printed: str) -> Callable[[Flown], str]:
 def _transfer_times(flown: Flown) -> str:
     shortest, middle = flown["initialization 0.1"], flown["initialization 0.4"]
     return (
-        f"Both fall as one over the transfer time: {_max(shortest, 0)} and {_accel(shortest, 0)} at 0.1 periods, "
-        f"{_max(middle, 0)} and {_accel(middle, 0)} at 0.4. Nothing in these two quantities speaks against more than "
-        "0.8 periods."
+        f"Both are inversely proportional to the transfer time: {_max(shortest, 0)} and {_accel(shortest, 0)} at 0.1 "
+        "periods, "
+        f"{_max(middle, 0)} and {_accel(middle, 0)} at 0.4. Neither quantity speaks against more than 0.8 periods."
     )
 
 
@@ -75,44 +75,45 @@ def _estimation(flown: Flown) -> str:
     after = keeping.time_s > keeping.scenario.orbit.period_s
     misses = np.linalg.norm((keeping.estimate - keeping.truth)[after, LQR, 0, :3], axis=-1)
     return (
-        f"After the first period the estimate's position is wrong by {number(float(np.sqrt((misses**2).mean())))} m "
-        f"(root mean square). {MEASUREMENTS}Cross-track the follower stays behind the desired path, which Figure "
-        "5.7 explains."
+        f"After the first period the estimated position is in error by {number(float(np.sqrt((misses**2).mean())))} m "
+        f"(root mean square). {MEASUREMENTS}Cross-track the follower lags the desired path, which Figure 5.7 explains."
     )
 
 
 def _keeping(flown: Flown) -> str:
-    printed, meant = flown["keeping"], flown["meant"]
+    printed, corrected = flown["keeping"], flown["corrected"]
     share = 100 * (printed.effort()[LQR, :, 2] / printed.effort()[LQR].sum(axis=-1)).mean()
     return (
         f"{READING}error-state LQR with the printed weights errs by {_max(printed, LQR)} at most with "
         f"{_accel(printed, LQR)}, {share:.3g} % of the effort across the plane: the thesis's numbers, but no "
-        f"spacecraft moves like this. With k's n the same law errs by {_mean(meant, MEANT_LQR)} in the mean and "
-        f"spends {_spent(meant, MEANT_LQR)} in place of {_spent(printed, LQR)}; the trajectory-following law of "
-        f"eq. (4.17-4.19) errs by {_mean(meant, MEANT_TRACKING)}."
+        f"spacecraft moves like this. With k's n the same law errs by {_mean(corrected, CORRECTED_LQR)} in the mean "
+        f"and spends {_spent(corrected, CORRECTED_LQR)} in place of {_spent(printed, LQR)}; the trajectory-following "
+        f"law of eq. (4.17-4.19) errs by {_mean(corrected, CORRECTED_TRACKING)}."
     )
 
 
-def _finer(flown: Flown) -> str:
+def _tighter(flown: Flown) -> str:
     return (
-        f"With a = {plan.FINER.control_s2:g} in place of 12000 the greatest error is {_max(flown['keeping'], FINER)}."
+        f"With a = {figure_flights.TIGHTER.control_s2:g} in place of 12000 the greatest error is "
+        f"{_max(flown['keeping'], TIGHTER)}."
     )
 
 
 def _sweep(flown: Flown) -> str:
     return (
-        f"Each point is a weight a I / n² with a from {min(plan.SWEEP_S2):g} to {max(plan.SWEEP_S2):g}. {READING}"
-        "consumption grows in proportion to time, and hardly depends on accuracy: it pays for the wrong cross-track "
-        "frequency. The thesis's axis ends at 40; its unit, m/s², hints at a sum of accelerations over samples, which "
-        "equals m/s only if they are 1 s apart."
+        f"Each point is a weight a I / n² with a from {min(figure_flights.SWEEP_S2):g} to "
+        f"{max(figure_flights.SWEEP_S2):g}. {READING}"
+        "consumption is proportional to time and nearly independent of accuracy: it compensates the wrong cross-track "
+        "frequency. The thesis's axis ends at 40; its unit, m/s², suggests a sum of acceleration samples, which equals "
+        "m/s only if they are 1 s apart."
     )
 
 
 def _failure(flown: Flown) -> str:
     greatest = number(flown["failure"].max_error()[FAILED_LQR, 0])
     return (
-        f"On this seed the error grows to {greatest} m. How far it grows is the initial error's doing, about which the "
-        "thesis says nothing (here 50 m and 0.05 m/s on each axis, 1 sigma)."
+        f"On this seed the error grows to {greatest} m. How far depends on the initial error, which the thesis does "
+        "not state (here 50 m and 0.05 m/s on each axis, 1 sigma)."
     )
 
 
@@ -148,15 +149,16 @@ def _lqr_or_smc(flown: Flown) -> str:
     failure = flown["failure"]
     more = 100 * (failure.delta_v()[FAILED_SMC].mean() / failure.delta_v()[FAILED_LQR].mean() - 1)
     return (
-        f"SMC with the printed gains spends {more:.3g} % more than LQR with the printed weights, but its mean error is "
-        f"{_mean(failure, FAILED_SMC)} against {_mean(failure, FAILED_LQR)}: the thesis's conclusion does not come out."
+        f"SMC with the printed settings spends {more:.3g} % more than LQR with the printed weights, but its mean error "
+        f"is {_mean(failure, FAILED_SMC)} against {_mean(failure, FAILED_LQR)}: the thesis's conclusion is not "
+        "reproduced."
     )
 
 
 def _reconfiguration(flown: Flown) -> str:
     flights = flown["small position error"]
     return (
-        f"No weight is printed for this section; a = {plan.MANEUVER_S2:g} gives {_accel(flights, 0)}, "
+        f"No weight is printed for this section; a = {figure_flights.MANEUVER_S2:g} gives {_accel(flights, 0)}, "
         f"about the figure's 60 mm/s². After 0.4 periods the error is {number(_after(flights, 0.4))} m."
     )
 
@@ -182,8 +184,9 @@ def _velocity(values: tuple[float, ...]) -> str:
 def _mission(flown: Flown) -> str:
     flights = flown["mission"]
     return (
-        f"Neither weight nor entry are printed for this section; a = {plan.MANEUVER_S2:g} as in section 5.2.4 gives "
-        f"{_accel(flights, 0)}. The greatest error, {_max(flights, 0)}, is the distance to the circle when the "
+        f"Neither weight nor entry are printed for this section; a = {figure_flights.MANEUVER_S2:g} as in section "
+        f"5.2.4 gives {_accel(flights, 0)}. The greatest error, {_max(flights, 0)}, is the distance to the circle when "
+        f"the "
         "formations change; at the entry of section 5.2.4, now on the far side, it would be 5 km."
     )
 
@@ -196,7 +199,7 @@ NOTES: Final[dict[str, Callable[[Flown], str]]] = {
     "5.5": _transfer_times,
     "5.6": _estimation,
     "5.7": _keeping,
-    "5.9": _finer,
+    "5.9": _tighter,
     "5.10": _sweep,
     "5.11": lambda flown: MEASUREMENTS,
     "5.12": _failure,
@@ -207,8 +210,8 @@ NOTES: Final[dict[str, Callable[[Flown], str]]] = {
     "5.19": _lqr_or_smc,
     "5.20": _reconfiguration,
     "5.22": _start("large position error", "Entry at the opposite point of the circle, [0, −3324, 0, −1.8, 0, −3.6]."),
-    "5.23": _start("small velocity error", _velocity(plan.SMALL_VELOCITY_M_S)),
-    "5.24": _start("large velocity error", _velocity(plan.LARGE_VELOCITY_M_S)),
+    "5.23": _start("small velocity error", _velocity(figure_flights.SMALL_VELOCITY_M_S)),
+    "5.24": _start("large velocity error", _velocity(figure_flights.LARGE_VELOCITY_M_S)),
     "5.25": _mission,
 }
-"""By the figure's number; figures that need no word have none."""
+"""Notes by the figure's number; not every figure needs one."""

@@ -1,4 +1,4 @@
-"""Errors and accelerations over time, and what the filter makes of it."""
+"""Errors, accelerations and estimates over time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from baselines.thesis.figures import style
-from baselines.thesis.flights import Flights
+from baselines.thesis.recorded_flights import Flights
 from formation_env.numerics.arrays import Array
 from formation_env.task.schedule import legs
 
@@ -63,7 +63,7 @@ def four_panels(lines: Sequence[Line]) -> Figure:
 
 
 def _both_legends(figure: Figure, vectors: Axes, magnitudes: Axes) -> None:
-    """Axes and lines in one legend above the panels."""
+    """Put axes and lines in one legend above the panels."""
     handles, labels = vectors.get_legend_handles_labels()
     more, names = magnitudes.get_legend_handles_labels()
     handles, labels = [*handles, *reversed(more)], [*labels, *reversed(names)]
@@ -71,27 +71,27 @@ def _both_legends(figure: Figure, vectors: Axes, magnitudes: Axes) -> None:
 
 
 def flown(flights: Flights) -> slice:
-    """The instants up to the last arrival, if a transfer is all that the scenario is made for; else all."""
+    """Instants up to the last arrival if the scenario is a single transfer; else all."""
     last = legs(flights.scenario)[-1]
     brief = last.arrival > last.start and last.end - last.arrival == 1
     return slice(0, len(flights.steps) - brief)
 
 
 def _vector(axes: Axes, time_s: Array, values: Array) -> None:
-    """The components (instants, 3) of a vector over time (instants,), s."""
+    """Plot the components (instants, 3) of a vector over time (instants,), s."""
     for (name, color, dash), component in zip(style.AXES, values.T, strict=True):
         axes.plot(time_s, component, color=color, linestyle=dash, label=f"{name}-axis")
 
 
 @dataclass(frozen=True)
-class Window:
-    """A piece of time to look at closely, s."""
+class TimeSpan:
+    """Time span of an enlarged panel, s."""
 
     start_s: float
     end_s: float
 
 
-def estimation(flights: Flights, policy: int, windows: Sequence[Window], color: str) -> Figure:
+def estimation(flights: Flights, policy: int, windows: Sequence[TimeSpan], color: str) -> Figure:
     """Desired, true, measured and estimated position along each axis, each in a window; no measurement is shaded."""
     figure = style.sheet(6.0)
     for axes, window, axis in zip(figure.subplots(3, 1), windows, range(3), strict=True):
@@ -114,6 +114,6 @@ def estimation(flights: Flights, policy: int, windows: Sequence[Window], color: 
 
 
 def outages(flights: Flights, time_s: Array) -> list[tuple[float, float]]:
-    """The dropout window within some kept instants (n,), from its first to the next one with a measurement, s."""
+    """The dropout window within some recorded instants (n,), from its first to the next one with a measurement, s."""
     lost = flights.scenario.dropout.closed(time_s).nonzero()[0]
     return [(time_s[lost[0]], time_s[min(lost[-1] + 1, len(time_s) - 1)])] if len(lost) else []

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from baselines.thesis.figures import style
-from baselines.thesis.flights import Flights
+from baselines.thesis.recorded_flights import Flights
 from formation_env.numerics.arrays import Array
 from formation_env.task.schedule import legs
 
@@ -24,7 +24,7 @@ def flight_path(flights: Flights, policy: int, color: str) -> Figure:
 
 
 def phase_paths(flights: Flights, policy: int, pieces: list[tuple[str, float, float]], color: str) -> Figure:
-    """The same, piece by piece.
+    """True and desired trajectory of the first seed, piece by piece.
 
     Args:
         flights: whose first seed is drawn.
@@ -44,7 +44,7 @@ def phase_paths(flights: Flights, policy: int, pieces: list[tuple[str, float, fl
 
 
 def _paths(axes: Any, flights: Flights, policy: int, piece: slice, color: str) -> None:
-    """A piece of a flight, where it begins, where it should, and the leader."""
+    """Plot a piece of a flight, its true and desired start, and the leader."""
     true, desired = flights.truth[piece, policy, 0, :3], flights.desired[piece, :3]
     jumps = np.searchsorted(flights.steps[piece], [leg.start + 1 for leg in legs(flights.scenario)[1:]])
     axes.plot(*np.insert(desired, jumps, np.nan, axis=0).T, color=style.DESIRED, lw=2.6, label="desired trajectory")
@@ -56,12 +56,12 @@ def _paths(axes: Any, flights: Flights, policy: int, piece: slice, color: str) -
 
 
 def point(axes: Any, place: Array, marker: str, color: str, label: str) -> None:
-    """One place in space."""
+    """Plot one position."""
     axes.plot(*place[:, None], linestyle="none", marker=marker, color=color, markersize=6, label=label)
 
 
 def scales(axes: Any, points: Array) -> None:
-    """Axes in metres around points (n, 3), each with a scale of its own, so that all can be read."""
+    """Scale each axis, in metres, to points (n, 3) independently."""
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     middle, half = (low + high) / 2, np.maximum((high - low) / 2 * MARGIN, 0.05 * (high - low).max() or 1.0)
     for name, centre, width in zip("xyz", middle, half, strict=True):

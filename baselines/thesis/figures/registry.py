@@ -1,22 +1,23 @@
-"""Which figure shows what, beside which sentence of the thesis.
+"""Registry of the figures, each with the statement of the thesis that it supports.
 
-To add a figure: a function that draws it from the flights of `baselines.thesis.plan`, and an entry in `FIGURES`.
+To add a figure: a function that draws it from the flights of `baselines.thesis.figure_flights`, and an entry in
+`FIGURES`.
 """
 
 from dataclasses import dataclass
 from typing import Final
 
-from baselines.thesis import plan
+from baselines.thesis import figure_flights
 from baselines.thesis.figures import comparisons, drawings, orbits, panels
-from baselines.thesis.figures.drawings import BLUE, FAILED_LQR, FAILED_SMC, FINER, LQR, RED, SKY, SMC, Draw, Flown
+from baselines.thesis.figures.drawings import BLUE, FAILED_LQR, FAILED_SMC, LQR, RED, SKY, SMC, TIGHTER, Draw, Flown
 from baselines.thesis.figures.notes import NOTES
-from baselines.thesis.figures.panels import Window
+from baselines.thesis.figures.panels import TimeSpan
 from formation_env.formations import ProjectedCircle, SpaceCircle, XYEllipse
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure of the thesis, drawn anew.
+    """A redrawn figure of the thesis.
 
     Attributes:
         title: what it shows.
@@ -29,7 +30,7 @@ class Figure:
     draw: Draw
 
     def note(self, number: str, flown: Flown) -> str:
-        """What came out, in a sentence or two; empty if there is nothing to say."""
+        """Outcome in a sentence or two; empty if there is none."""
         return NOTES[number](flown) if number in NOTES else ""
 
 
@@ -79,7 +80,7 @@ FIGURES: Final[dict[str, Figure]] = {
         "Thus, the optimal initialization time is between 0.2p and 0.8p, because the control cost for shortening the "
         "transfer time is too high when tf ≤ 0.1 ≈ 9min and meanwhile it cost the control accuracy.",
         lambda flown: comparisons.against_transfer_time(
-            {periods: flown[f"initialization {periods:g}"] for periods in plan.TRANSFER_PERIODS}, SKY
+            {periods: flown[f"initialization {periods:g}"] for periods in figure_flights.TRANSFER_PERIODS}, SKY
         ),
     ),
     "5.6": Figure(
@@ -87,7 +88,7 @@ FIGURES: Final[dict[str, Figure]] = {
         "Kalman filter performs good estimation in 3-axis position; otherwise, precise position control would not "
         "complete under the existence of noise.",
         lambda flown: panels.estimation(
-            flown["keeping"], LQR, (Window(12650, 12850), Window(0, 60000), Window(10000, 17000)), BLUE
+            flown["keeping"], LQR, (TimeSpan(12650, 12850), TimeSpan(0, 60000), TimeSpan(10000, 17000)), BLUE
         ),
     ),
     "5.7": Figure(
@@ -107,7 +108,7 @@ FIGURES: Final[dict[str, Figure]] = {
         "Space circle formation relative trajectory (control accuracy 175m)",
         "Then we modify control-weighting matrix R, let the control accuracy reach 175 m (Figure 5.9) for the "
         "comparison with the previous trajectory.",
-        drawings.one_path("keeping", FINER, BLUE),
+        drawings.one_path("keeping", TIGHTER, BLUE),
     ),
     "5.10": Figure(
         "Control consumption vs. accuracy with different formation keeping time t",
@@ -120,7 +121,7 @@ FIGURES: Final[dict[str, Figure]] = {
         "In the beginning of the formation maintain, a communication failure happens with a time-span of about 3000 s. "
         "Follower keeps tracking with the desired trajectory with the state estimation provided by Kalman filter.",
         lambda flown: panels.estimation(
-            flown["failure"], FAILED_LQR, (Window(0, 15000), Window(1000, 2500), Window(0, 60000)), BLUE
+            flown["failure"], FAILED_LQR, (TimeSpan(0, 15000), TimeSpan(1000, 2500), TimeSpan(0, 60000)), BLUE
         ),
     ),
     "5.12": Figure(
@@ -156,7 +157,7 @@ FIGURES: Final[dict[str, Figure]] = {
         "With communication failure, nonlinear SMC shows its power in governing system uncertainty. Figure 5.17 "
         "depicts the position estimation by Kalman filter.",
         lambda flown: panels.estimation(
-            flown["failure"], FAILED_SMC, (Window(0, 6000), Window(2400, 3600), Window(0, 60000)), RED
+            flown["failure"], FAILED_SMC, (TimeSpan(0, 6000), TimeSpan(2400, 3600), TimeSpan(0, 60000)), RED
         ),
     ),
     "5.18": Figure(
@@ -219,4 +220,4 @@ FIGURES: Final[dict[str, Figure]] = {
         drawings.mission_phases,
     ),
 }
-"""By number. Figure 5.1 is a block diagram without numbers, so it is left out."""
+"""Figures by number. Figure 5.1 is a block diagram and is omitted."""

@@ -1,4 +1,4 @@
-"""What the thesis's figures share: sizes, colours, axes, and how they become files."""
+"""Shared style of the thesis's figures: sizes, colours, axes and file formats."""
 
 from io import BytesIO
 from typing import Any, Final
@@ -15,7 +15,7 @@ DPI: Final = 150
 AXES: Final = (("x", "#009E73", "-"), ("y", "#E69F00", "--"), ("z", "#333333", "-."))
 """Name, colour and dash of each LVLH axis; Okabe and Ito's colours."""
 COLORS: Final = {name: look.color for name, look in looks(("lqr", "lqr_quasi_static", "smc")).items()}
-"""Of the policies, as in the report."""
+"""Colours of the policies, as in the report."""
 DESIRED: Final = NEUTRAL
 PLANNED: Final = "#333333"
 START: Final = "#E69F00"
@@ -33,29 +33,29 @@ _NO_DATE: Final = {"svg": {"Date": None, "Creator": None}, "png": {"Software": N
 
 
 def settings() -> Any:
-    """A context in which figures are drawn and saved."""
+    """Context in which figures are drawn and saved."""
     return matplotlib.rc_context(_SETTINGS)
 
 
 def sheet(height_in: float) -> Figure:
-    """An empty figure; what is drawn on it is laid out without overlaps."""
+    """Make an empty figure with constrained layout."""
     return Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
 
 
 def label(axes: Axes, x: str, y: str) -> None:
-    """Name quantity and unit of both axes."""
+    """Label quantity and unit of both axes."""
     axes.set_xlabel(x)
     axes.set_ylabel(y)
 
 
 def legend(figure: Figure, axes: Axes, columns: int = 4) -> None:
-    """One legend above all axes, where it hides nothing."""
+    """Put one legend above all axes, where it hides no data."""
     handles, labels = axes.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=min(columns, len(labels)))
 
 
 def images(figure: Figure) -> dict[str, bytes]:
-    """The figure as files, by kind: `svg` and `png`. It is laid out once, for that takes longest."""
+    """Files of the figure by kind, `svg` and `png`; it is laid out once, since the layout is slow."""
     result = {}
     for kind, metadata in _NO_DATE.items():
         stream = BytesIO()
@@ -66,5 +66,5 @@ def images(figure: Figure) -> dict[str, bytes]:
 
 
 def few_ticks() -> MaxNLocator:
-    """For a small axis in space."""
+    """Tick locator of small axes."""
     return MaxNLocator(4, min_n_ticks=3)

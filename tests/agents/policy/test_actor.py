@@ -6,7 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from actor_helpers import assert_equal_up_to_rounding, rounding_bound
+from damage_helpers import refusals
 from safetensors.numpy import save_file
+from safetensors.torch import save_file as save_torch_file
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from torch import nn
@@ -55,14 +58,16 @@ def make_sac(env: Sb3VecEnv, activation: type[nn.Module]) -> BaseAlgorithm:
 def test_an_actor_acts_as_the_model_it_was_made_of(
     make: Callable[[Sb3VecEnv, type[nn.Module]], BaseAlgorithm], activation: str, scenario: Scenario
 ) -> None:
-    """SB3's own deterministic predict, through the power, is the oracle; float32 sums round differently."""
+    """SB3's own deterministic predict, through the power, is the oracle, up to the rounding of float32 sums."""
     model = make(Sb3VecEnv(2, scenario), MODULES[activation])
     z, _ = model.predict(observations(500), deterministic=True)
-    actions, state = actor_of(model, POWER, scenario).predict(observations(500), state="mine")
+    actor = actor_of(model, POWER, scenario)
+    actions, state = actor.predict(observations(500), state="mine")
     assert state == "mine"
     assert actions.dtype == np.float32
     assert np.abs(z).std() > 0.02  # the actions differ from each other
-    np.testing.assert_allclose(actions, np.sign(z) * np.abs(z) ** POWER, rtol=0, atol=3e-6)
+    expected = np.sign(z) * np.abs(z) ** POWER
+    assert_equal_up_to_rounding(actions, expected, rounding_bound(actor, observations(500)))
     if make is make_ppo:
         assert 0.01 < (np.abs(z) == 1).mean() < 0.99  # some are clipped
 
@@ -72,11 +77,12 @@ def test_one_observation_and_a_batch_act_alike(scenario: Scenario) -> None:
     actor = Actor(layers(16), Functions("tanh", "clip", POWER), scenario)
     batch, _ = actor.predict(observations(20))
     space = FormationEnv(scenario=scenario).action_space
-    for observation, action in zip(observations(20), batch, strict=True):
+    bounds = rounding_bound(actor, observations(20))
+    for observation, action, bound in zip(observations(20), batch, bounds, strict=True):
         single, state = actor.predict(observation)
         assert state is None
         assert space.contains(single)
-        np.testing.assert_allclose(single, action, rtol=0, atol=1e-6)
+        assert_equal_up_to_rounding(single, action, bound)
 
 
 def test_two_layers_by_hand(scenario: Scenario) -> None:
@@ -120,7 +126,7 @@ LAYER = {"layers.0.weight": WEIGHT, "layers.0.bias": BIAS}
             GOOD,
             r"must be float32 \(3, 38\), got float32 \(38, 3\)",
         ),
-        (LAYER | {"layers.0.weight": WEIGHT.astype(float)}, GOOD, "weight: must be float32 .*, got float64"),
+        (LAYER | {"layers.0.weight": WEIGHT.astype(float)}, GOOD, "layers.0.weight: must be float32, got F64"),
         (LAYER | {"layers.0.bias": BIAS * np.float32(np.nan)}, GOOD, "layers.0.bias: must be finite"),
         (LAYER, GOOD | {"activation": "tnh"}, "activation: no such function: 'tnh'; did you mean 'tanh'?"),
         (LAYER, GOOD | {"squash": "clp"}, "squash: no such function: 'clp'; did you mean 'clip'?"),
@@ -158,3 +164,36 @@ def test_other_networks_are_refused(scenario: Scenario) -> None:
         actor_of(TD3("MlpPolicy", env, buffer_size=10, device="cpu"), POWER, scenario)
     with pytest.raises(ConfigError, match="activation: no such function"):
         actor_of(make_sac(env, nn.Softsign), POWER, scenario)
+
+
+@pytest.mark.parametrize("dtype", ["bfloat16", "float8_e4m3fn", "float16", "int32"])
+def test_tensors_of_other_types_are_one_line(dtype: str, scenario: Scenario, tmp_path: Path) -> None:
+    """Types that numpy does not have are refused like those that it has."""
+    path = tmp_path / "actor.safetensors"
+    tensors = {"layers.0.weight": torch.zeros(3, SIZE, dtype=getattr(torch, dtype)), "layers.0.bias": torch.zeros(3)}
+    save_torch_file(tensors, path, GOOD)
+    with pytest.raises(ConfigError, match=r"actor.safetensors: layers.0.weight: must be float32, got \w+$"):
+        read_actor(path, scenario)
+
+
+@pytest.mark.parametrize(
+    ("weight", "bias"), [((), ()), ((3, SIZE), ()), ((3,), (3,)), ((), (3,)), ((3, SIZE, 1), (3,))]
+)
+def test_tensors_of_other_ranks_are_one_line(
+    weight: tuple[int, ...], bias: tuple[int, ...], scenario: Scenario, tmp_path: Path
+) -> None:
+    """Scalars and vectors in place of matrices."""
+    path = tmp_path / "actor.safetensors"
+    tensors = {"layers.0.weight": np.zeros(weight, np.float32), "layers.0.bias": np.zeros(bias, np.float32)}
+    save_file(tensors, path, GOOD)
+    with pytest.raises(ConfigError, match=r"actor.safetensors: layers.0.\w+: must be float32 of rank"):
+        read_actor(path, scenario)
+
+
+def test_damaged_files_are_one_line_or_another_actor(scenario: Scenario, tmp_path: Path) -> None:
+    """Each byte of the header inverted, and cuts throughout: an error that names the file, or an actor."""
+    actor, path = Actor(layers(), Functions("tanh", "clip", POWER), scenario), tmp_path / "actor.safetensors"
+    content = to_bytes(actor)
+    header = 8 + int.from_bytes(content[:8], "little")
+    faults = refusals(path, content, lambda: read_actor(path, scenario), header)
+    assert len(faults) > header / 2

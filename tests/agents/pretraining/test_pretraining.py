@@ -2,10 +2,13 @@
 
 import dataclasses
 import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
+from agents_helpers import PRETRAINED, small_run
 from torch import nn
 
 from agents.hyperparameters import Network, Pretraining
@@ -13,8 +16,9 @@ from agents.policy.actor import Actor, Functions
 from agents.policy.features import CUT, features
 from agents.pretraining.gradient import SMOOTH_M, SMOOTH_THROTTLE, ModelEpisodes
 from agents.pretraining.imitation import Lesson, imitate
-from agents.pretraining.pretrain import pretrain
+from agents.pretraining.pretrain import check_pretraining, pretrain
 from agents.pretraining.recording import record_disturbances
+from agents.training.train import train
 from baselines import make_policy
 from formation_env import FormationVectorEnv, load_scenario
 from formation_env.evaluation.rollout import evaluate
@@ -188,6 +192,53 @@ def test_a_truth_that_is_not_one_linear_model_has_no_such_gradient(name: str, re
     """Said in one line."""
     with pytest.raises(ConfigError, match=f"^{reason}$"):
         record_disturbances(load_scenario(name), SEEDS)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"spacecraft": {"thrust_noise": 0.05}}, "spacecraft.thrust_noise: 0, got 0.05"),
+        ({"spacecraft": {"min_accel_m_s2": 1e-4}}, "spacecraft.min_accel_m_s2: 0, got 0.0001"),
+        ({"filter": {"thrust_noise": 0.02}}, "filter.thrust_noise: 0, got 0.02"),
+        ({"filter": {"dynamics": "hcw"}}, "a filter with the true dynamics, got filter.dynamics: hcw"),
+    ],
+)
+def test_disturbances_that_depend_on_thrust_are_refused(
+    changes: dict[str, dict[str, Any]], reason: str, tmp_path: Path
+) -> None:
+    """Recorded without thrust, they would be others than those flown; said before any work, and not in silence.
+
+    Each of these scenarios does give other estimation errors, or another effect, under thrust than without.
+    """
+    scenario = short("keeping")
+    parts = {key: dataclasses.replace(getattr(scenario, key), **values) for key, values in changes.items()}
+    changed = dataclasses.replace(scenario, **parts)
+    assert thrust_matters(changed)
+    assert not thrust_matters(scenario)
+    with pytest.raises(ConfigError, match=f"^pretraining: the gradient through the model needs {reason}"):
+        record_disturbances(changed, SEEDS)
+    run = small_run(tmp_path, "ppo", PRETRAINED)
+    with pytest.raises(ConfigError, match=f"^pretraining: the gradient through the model needs {reason}"):
+        train(dataclasses.replace(run, scenario=changed), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+    check_pretraining(Pretraining(updates=0), changed, seed=0)  # imitation needs no model
+
+
+def thrust_matters(scenario: Scenario) -> bool:
+    """Whether estimation errors, or the effect of the random accelerations, change with the thrust."""
+    ends = []
+    for thrust in (0.0, 1e-2):
+        env = FormationVectorEnv(4, scenario)
+        _, infos = env.reset(seed=[1, 2, 3, 4])
+        model, gamma = scenario.true_dynamics(), scenario.spacecraft.max_accel_m_s2 * scenario.true_dynamics().Gamma
+        pushes, state = [], infos["true_state"]
+        for _ in range(scenario.num_steps - 1):
+            infos = env.step(np.full((4, 3), thrust, np.float32))[4]
+            predicted = state @ model.Phi.T + model.delta + gamma @ np.full(3, thrust, np.float32)
+            state = infos["true_state"]
+            pushes.append(state - predicted)
+        ends.append(np.hstack([infos["estimate"] - state, *pushes]))
+    return not np.allclose(*ends, rtol=1e-6, atol=1e-6)
 
 
 def test_the_gradient_goes_through_all_variants_of_a_scenario() -> None:

@@ -7,7 +7,7 @@ import pytest
 from agents_helpers import PRETRAINED, assert_refused, small_run
 from typer.testing import CliRunner
 
-from agents.__main__ import app
+from agents.cli import app
 from agents.results.curve import PRETRAINING, Levels, by_environment, figure_of, levels_of
 from agents.training.run_folder import CURVE, read_curve, read_pretraining, start_run
 from agents.training.train import train
@@ -32,7 +32,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def test_one_picture_per_environment(runs: dict[str, Path], tmp_path: Path) -> None:
     """Both algorithms share it; it is a PNG, nothing else appears beside it, and drawn again it has the same bytes."""
     out, bounds = tmp_path / "new" / "pictures", tmp_path / "bounds"
-    command = ["curve", *map(str, runs.values()), "--out", str(out), "--bounds", str(bounds)]
+    command = ["plot-curves", *map(str, runs.values()), "--out", str(out), "--bounds", str(bounds)]
     pictures = []
     for _ in range(2):
         result = CliRunner().invoke(app, command)
@@ -92,8 +92,8 @@ def test_what_cannot_be_drawn_is_one_line(runs: dict[str, Path], tmp_path: Path)
     for arguments, fault in (
         ([tmp_path / "none"], "settings.json: cannot be read"),
         ([tmp_path / "begun"], "validation.csv: cannot be read"),
-        ([runs["ppo"], "--baseline", "lqrr"], "did you mean 'lqr'?"),
-        ([runs["ppo"], tmp_path / "others"], f"validation_episodes: is another than that of {runs['ppo']}"),
+        ([runs["ppo"], "--policy", "lqrr"], "did you mean 'lqr'?"),
+        ([runs["ppo"], tmp_path / "others"], f"validation_episodes: differs from that of {runs['ppo']}"),
     ):
-        assert_refused(["curve", *map(str, (*arguments, "--out", tmp_path / "out"))], fault)
+        assert_refused(["plot-curves", *map(str, (*arguments, "--out", tmp_path / "out"))], fault)
     assert not (tmp_path / "out").exists()

@@ -15,8 +15,8 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from typer.testing import CliRunner, Result
 
 from agents import Actor
-from agents.__main__ import MISTAKE, app
 from agents.algorithms.vec_env import Sb3VecEnv
+from agents.cli import app
 from agents.policy import library
 from agents.policy.actor import Functions, to_bytes
 from agents.policy.library import CARD, TENSORS, policy_name, sha256
@@ -28,6 +28,7 @@ from baselines.experiments.policy_factories import describe
 from baselines.experiments.sweep import points
 from baselines.report import ReportOptions
 from formation_env import ENV_IDS, ConfigError, Scenario, load_scenario
+from formation_env.cli_errors import WRONG_INPUT
 from formation_env.evaluation.rollout import evaluate
 from formation_env.evaluation.seeds import seeds
 from formation_env.evaluation.statistics import summarise
@@ -93,7 +94,7 @@ class Missing:
 
 sys.meta_path.insert(0, Missing())
 from agents.policy import library as shipped
-from agents.__main__ import app
+from agents.cli import app
 
 shipped.SHIPPED = pathlib.Path(sys.argv.pop(1))
 app()
@@ -104,7 +105,7 @@ def test_shipped_policies_stand_in_the_report_by_themselves(policies: Path, tmp_
     """Without --model each algorithm flies its policy beside all classical ones, on equal seeds, and without torch."""
     out = tmp_path / "reports"
     few = ["--episodes", EPISODES, "--slow-episodes", 1, "--sweep-episodes", 0, "--processes", 1]
-    command = [sys.executable, "-c", WITHOUT_LEARNING_LIBRARIES, policies, "report", "--env", START, *few, "--out", out]
+    command = [sys.executable, "-c", WITHOUT_LEARNING_LIBRARIES, policies, "report", START, *few, "--out", out]
     found = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False, timeout=300)
     assert found.returncode == 0, found.stderr
     table = pd.read_csv(out / "episodes.csv")
@@ -175,7 +176,7 @@ def test_environments_follow_from_the_models(policies: Path, tmp_path: Path) -> 
     own = path.rename(policies / f"ppo_mine{TENSORS}")
     own.with_suffix(CARD).write_text(json.dumps(card))
     result = run("report", "--model", f"mine={own}", "--out", tmp_path / "out")
-    assert result.exit_code == MISTAKE
+    assert result.exit_code == WRONG_INPUT
     assert "was trained on a scenario of its own; name its file" in result.stderr
 
 
@@ -187,7 +188,7 @@ def test_what_is_shipped_flies_where_it_was_trained(
     flown: list[list[str]] = []
     monkeypatch.setattr(report, "write_report", lambda _, envs, *rest, **more: flown.append(list(envs)) or tmp_path)
     assert run("report", "--out", tmp_path).exit_code == 0
-    assert run("report", "--env", KEEPING, "--out", tmp_path).exit_code == 0
+    assert run("report", KEEPING, "--out", tmp_path).exit_code == 0
     assert flown == [[*ENV_IDS, "bad_communication"], [KEEPING]]
     bad = load_scenario("bad_communication")
     assert library.load_policy("ppo", "bad_communication").scenario == bad
@@ -196,8 +197,8 @@ def test_what_is_shipped_flies_where_it_was_trained(
 def test_a_model_that_flies_nowhere_is_a_mistake(policies: Path, tmp_path: Path) -> None:
     """Nothing flies then, and nothing is written."""
     path = policies / f"ppo_keeping{TENSORS}"
-    result = run("report", "--model", f"mine={path}", "--env", START, "--out", tmp_path / "out")
-    assert result.exit_code == MISTAKE
+    result = run("report", "--model", f"mine={path}", START, "--out", tmp_path / "out")
+    assert result.exit_code == WRONG_INPUT
     assert f"mine: {path} was trained on what the report leaves out" in result.stderr
     assert not (tmp_path / "out").exists()
 
@@ -215,7 +216,7 @@ def test_a_model_of_ones_own_is_evaluated(kind: type[BaseAlgorithm], tmp_path: P
     """The printed means are those of the model flown here on the test seeds, to the four digits printed."""
     model, path = make_model(kind, tmp_path)
     assert algorithm_of(path) == kind.__name__
-    options = ["--env", START, "--episodes", EPISODES, "--bound-episodes", 0, "--allow-pickle", "--throttle-power", 2]
+    options = [START, "--episodes", EPISODES, "--bound-episodes", 0, "--allow-pickle", "--throttle-power", 2]
     result = run("evaluate", path, *options)
     assert result.exit_code == 0, result.output
     assert "warning" in result.stderr
@@ -244,8 +245,8 @@ def test_pickle_is_refused_without_the_flag(tmp_path: Path, monkeypatch: pytest.
 
     _, path = make_model(PPO, tmp_path)
     monkeypatch.setattr(PPO, "load", refuse)
-    result = run("evaluate", path, "--env", START)
-    assert result.exit_code == MISTAKE
+    result = run("evaluate", path, START)
+    assert result.exit_code == WRONG_INPUT
     assert "holds pickled objects, which may run any code when they are loaded; give --allow-pickle" in result.stderr
     assert result.stderr.count("\n") == 1
 
@@ -284,7 +285,7 @@ def test_a_shipped_file_is_evaluated_against_the_bound(policies: Path, tmp_path:
 
 def test_flying_elsewhere_is_noted(policies: Path) -> None:
     """A policy may be scored on a scenario that it was not trained on, but not by mistake."""
-    options = ["--episodes", EPISODES, "--bound-episodes", 0, "--env"]
+    options = ["--episodes", EPISODES, "--bound-episodes", 0]
     for env, noted in (("bad_communication", True), (KEEPING, False)):
         result = run("evaluate", policies / f"ppo_keeping{TENSORS}", *options, env)
         assert result.exit_code == 0, result.output
@@ -311,16 +312,16 @@ def test_faulty_sources_are_one_line(tmp_path: Path) -> None:
         (tmp_path / "model.onnx", "must end in .safetensors"),
         (tmp_path, "settings.json: cannot be read"),
     ):
-        result = run("evaluate", source, "--env", START, "--allow-pickle")
-        assert result.exit_code == MISTAKE
+        result = run("evaluate", source, START, "--allow-pickle")
+        assert result.exit_code == WRONG_INPUT
         assert fault in result.stderr.splitlines()[-1]
 
 
 def test_options_that_do_not_go_with_the_source_are_refused(policies: Path, tmp_path: Path) -> None:
     """A file that says its power is not told another; a .zip must be told where to fly."""
     result = run("evaluate", policies / f"ppo_keeping{TENSORS}", "--throttle-power", 2)
-    assert result.exit_code == MISTAKE
+    assert result.exit_code == WRONG_INPUT
     assert "--throttle-power: only for a .zip" in result.stderr
     result = run("evaluate", make_model(PPO, tmp_path)[1])
-    assert result.exit_code == MISTAKE
+    assert result.exit_code == WRONG_INPUT
     assert "does not say what it was trained on; name it" in result.stderr

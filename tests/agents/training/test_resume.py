@@ -11,13 +11,14 @@ from agents_helpers import assert_refused, checkpoint_of, random_actor, small_ru
 from safetensors.torch import load_file
 from typer.testing import CliRunner
 
-from agents.__main__ import INTERRUPTED, MISTAKE, app
+from agents.cli import app
 from agents.policy.actor import to_bytes
 from agents.training.run_folder import BEST, CHECKPOINT, CURVE, RUN, start_run
 from agents.training.run_settings import default_folder
 from agents.training.train import resume, train
 from agents.training.validation import Validation
 from formation_env import ConfigError
+from formation_env.cli_errors import INTERRUPTED, WRONG_INPUT
 
 
 class KilledError(Exception):
@@ -112,13 +113,13 @@ def test_ctrl_c_saves_and_ends_and_resume_goes_on(tmp_path: Path, monkeypatch: p
         patch.setattr(Validation, "_on_step", interrupts)
         result = CliRunner().invoke(app, [*command, "--out", str(tmp_path / "run")])
     assert result.exit_code == INTERRUPTED
-    assert f"interrupted; go on with: python -m agents train --resume {tmp_path / 'run'}" in result.stderr
+    assert f"interrupted; continue with: formation-env agents train --out {tmp_path / 'run'} --resume" in result.stderr
     assert checkpoint_of(tmp_path / "run")["counters"]["num_timesteps"] == 384
     again = CliRunner().invoke(app, [*command, "--out", str(tmp_path / "run")])
-    assert again.exit_code == MISTAKE
+    assert again.exit_code == WRONG_INPUT
     assert f"error: {tmp_path / 'run'}: holds a run already" in again.stderr
     result = CliRunner().invoke(
-        app, ["train", "ppo", str(tmp_path / "scenario.yaml"), "--resume", str(tmp_path / "run")]
+        app, ["train", "ppo", str(tmp_path / "scenario.yaml"), "--resume", "--out", str(tmp_path / "run")]
     )
     assert result.exit_code == 0, result.output
     assert_same_results(tmp_path / "whole", tmp_path / "run")
@@ -138,7 +139,7 @@ def test_a_time_limit_saves_and_stops(tmp_path: Path) -> None:
     ("arguments", "fault"),
     [
         (["--steps", "100"], "ppo .*scenario.yaml; leave out steps"),
-        (["sac"], "goes on as it began: ppo .*; leave out algorithm"),
+        (["sac"], "continues as it began: ppo .*; leave out algorithm"),
         (["ppo", "keeping"], "leave out env"),
         (["--seed", "0"], "leave out seed"),
     ],
@@ -146,20 +147,24 @@ def test_a_time_limit_saves_and_stops(tmp_path: Path) -> None:
 def test_resume_takes_nothing_that_would_make_it_another_run(tmp_path: Path, arguments: list[str], fault: str) -> None:
     """One line, which names the option."""
     start_run(small_run(tmp_path, "ppo"), tmp_path / "run")
-    result = CliRunner().invoke(app, ["train", *arguments, "--resume", str(tmp_path / "run")])
-    assert result.exit_code == MISTAKE
+    result = CliRunner().invoke(app, ["train", *arguments, "--resume", "--out", str(tmp_path / "run")])
+    assert result.exit_code == WRONG_INPUT
     assert result.stderr.count("\n") == 1
     assert re.search(fault, result.stderr)
 
 
 def test_what_cannot_be_resumed_is_one_line(tmp_path: Path) -> None:
     """No run, a damaged checkpoint, or nothing said at all."""
-    assert_refused(["train"], "train: give an algorithm and an environment, or --resume FOLDER")
-    assert_refused(["train", "--resume", str(tmp_path / "none")], "settings.json: cannot be read: No such file")
+    assert_refused(["train"], "train: give an algorithm and an environment, or --out FOLDER --resume")
+    assert_refused(
+        ["train", "--resume", "--out", str(tmp_path / "none")], "settings.json: cannot be read: No such file"
+    )
     start_run(small_run(tmp_path, "ppo"), tmp_path / "run")
     for content in (b"", b"no checkpoint"):
         (tmp_path / "run" / CHECKPOINT).write_bytes(content)
-        assert_refused(["train", "--resume", str(tmp_path / "run")], f"{CHECKPOINT}: damaged, or not a checkpoint")
+        assert_refused(
+            ["train", "--resume", "--out", str(tmp_path / "run")], f"{CHECKPOINT}: damaged, or not a checkpoint"
+        )
 
 
 def test_runs_have_a_folder_and_steps_of_their_own(tmp_path: Path) -> None:

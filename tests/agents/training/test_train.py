@@ -8,14 +8,15 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from agents_helpers import small_run
+from actor_helpers import assert_equal_up_to_rounding, rounding_bound
+from agents_helpers import PRETRAINED, assert_refused, small_run
 from stable_baselines3 import PPO, SAC
 from typer.testing import CliRunner
 
-from agents.__main__ import MISTAKE, app
 from agents.algorithms.ppo import PPOSettings
 from agents.algorithms.registry import load_settings
 from agents.algorithms.sac import SACSettings
+from agents.cli import app
 from agents.results.evaluate import Sb3Policy
 from agents.training.run_folder import (
     BEST,
@@ -33,7 +34,8 @@ from agents.training.run_folder import (
 from agents.training.run_settings import plan_run
 from agents.training.train import train, training_seeds
 from agents.training.validation import validate
-from formation_env import ConfigError
+from formation_env import ConfigError, FormationVectorEnv
+from formation_env.cli_errors import WRONG_INPUT
 from formation_env.evaluation.rollout import evaluate
 from formation_env.evaluation.seeds import seeds
 from formation_env.files import replacing
@@ -70,6 +72,29 @@ def test_the_curve_is_of_the_validation_seeds(finished: tuple[Run, Path]) -> Non
     for policy in (load_best(folder)[1], Sb3Policy(model, 1.0)):
         table = evaluate(policy, run.scenario, seeds("validation", 4))
         assert table["return"].mean() == pytest.approx(best, rel=1e-5)
+
+
+def test_a_plainly_loaded_model_acts_like_the_actor(finished: tuple[Run, Path]) -> None:
+    """`PPO.load` and `SAC.load` know no throttle; what `predict` gives flies unchanged, with the same return."""
+    run, folder = finished
+    model = {"ppo": PPO, "sac": SAC}[run.algorithm].load(folder / MODEL, device="cpu")
+    actor = load_best(folder)[1]
+    observations = FormationVectorEnv(16, run.scenario).reset(seed=1)[0]
+    for seen in (observations, observations[0]):
+        actions = model.predict(seen, deterministic=True)[0]
+        assert_equal_up_to_rounding(actions, actor.predict(seen)[0], rounding_bound(actor, seen))
+    returns = [evaluate(policy, run.scenario, range(4))["return"] for policy in (model, actor)]
+    np.testing.assert_allclose(*returns, rtol=1e-4)
+
+
+def test_a_run_s_model_needs_no_throttle_power(finished: tuple[Run, Path]) -> None:
+    """It has its own; given another, it would be applied twice."""
+    run, folder = finished
+    assert_refused(
+        ["evaluate", str(folder / MODEL), "--env", run.env, "--allow-pickle", "--throttle-power", "2"],
+        f"--throttle-power: leave it out; {folder / MODEL} applies its own, 2.0",
+        last=True,
+    )
 
 
 def test_training_flies_training_seeds_only() -> None:
@@ -178,7 +203,7 @@ def test_faulty_hyperparameters_are_one_line_with_file_and_key(tmp_path: Path, t
 def test_mistakes_on_the_command_line_are_one_line(tmp_path: Path, arguments: list[str], fault: str) -> None:
     """No traceback, and nothing is left on the disk."""
     result = CliRunner().invoke(app, ["train", *arguments, "--steps", "100", "--out", str(tmp_path / "run")])
-    assert result.exit_code == MISTAKE
+    assert result.exit_code == WRONG_INPUT
     assert result.stderr.startswith("error: ")
     assert fault in result.stderr
     assert result.stderr.count("\n") == 1
@@ -221,3 +246,20 @@ def test_settings_survive_json(tmp_path: Path) -> None:
     start_run(run, tmp_path)
     assert load_run(tmp_path) == run
     assert asdict(load_run(tmp_path).agent)["rows"] == 4
+
+
+@pytest.mark.parametrize(
+    ("agent", "changes", "fault"),
+    [
+        ("", {"validation_episodes": 2_000_000}, "validation_episodes: .*2000000"),
+        ("", {"seed": 10**6}, "seed: no training seeds are left for 8 rows"),
+        (PRETRAINED, {"seed": 70_000}, "seed: no training seeds are left for pretraining, got 70000"),
+    ],
+)
+def test_what_would_fail_later_is_refused_at_once(
+    agent: str, changes: dict[str, Any], fault: str, tmp_path: Path
+) -> None:
+    """Before a folder is made."""
+    with pytest.raises(ConfigError, match=fault):
+        train(small_run(tmp_path, "ppo", agent, **changes), tmp_path / "run")
+    assert not (tmp_path / "run").exists()

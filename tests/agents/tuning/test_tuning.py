@@ -12,16 +12,16 @@ from agents_helpers import PRETRAINED, SMALL, assert_refused, small_run
 from optuna.trial import FrozenTrial, TrialState
 from typer.testing import CliRunner
 
-from agents.__main__ import INTERRUPTED, app
 from agents.algorithms.registry import ALGORITHMS, load_settings
+from agents.cli import app
 from agents.training.run_folder import CURVE, START, Run, read_curve
 from agents.training.train import train
 from agents.tuning import search as searching
-from agents.tuning.journal import seal_path
-from agents.tuning.search import BEST, JOURNAL, MIN_TRIALS_BEFORE_PRUNING, search, task_name
+from agents.tuning.search import BEST, JOURNAL, MIN_TRIALS_BEFORE_PRUNING, identity, search, task_name
 from agents.tuning.search_space import apply, current_values, search_space
-from baselines.tuning.study import open_study
+from baselines.tuning.journal import open_study
 from formation_env import ENV_IDS
+from formation_env.cli_errors import INTERRUPTED
 
 STEPS = (0, 100, 200)
 BOTTOM = 1e-4
@@ -30,7 +30,7 @@ BOTTOM = 1e-4
 
 def trials_in(run: Run, folder: Path) -> list[FrozenTrial]:
     """The trials in a study's journal."""
-    return open_study(task_name(run), folder / JOURNAL).get_trials()
+    return open_study(identity(run), folder / JOURNAL).get_trials()
 
 
 def numbers(trials: Sequence[FrozenTrial]) -> list[list[Any]]:
@@ -155,11 +155,7 @@ def test_all_trials_start_from_one_actor(tmp_path: Path) -> None:
     another = small_run(tmp_path, "ppo", PRETRAINED, steps=128, validations=1, start=run_folder)
     assert task_name(another) == task_name(given)  # what counts is the actor, wherever it is
     search(given, 1, tmp_path / "given")
-    assert [entry.name for entry in sorted((tmp_path / "given").iterdir())] == [
-        BEST,
-        JOURNAL,
-        seal_path(Path(JOURNAL)).name,
-    ]
+    assert [entry.name for entry in sorted((tmp_path / "given").iterdir())] == [BEST, JOURNAL]
 
 
 def command(folder: Path, *options: str) -> list[str]:
@@ -167,7 +163,7 @@ def command(folder: Path, *options: str) -> list[str]:
     small_run(folder, "ppo")
     (folder / "agent.yaml").write_text(SMALL["ppo"])
     given = ("--steps", "128", "--validations", "1", "--validation-episodes", "4")
-    paths = ("--config", str(folder / "agent.yaml"), "--study", str(folder / "study"))
+    paths = ("--config", str(folder / "agent.yaml"), "--out", str(folder / "study"))
     return ["tune", "ppo", str(folder / "scenario.yaml"), *given, *paths, *options]
 
 
@@ -183,7 +179,7 @@ def test_the_command_tells_and_goes_on_after_an_interrupt(tmp_path: Path, monkey
     monkeypatch.setattr(searching, "train", interrupted)
     result = CliRunner().invoke(app, command(tmp_path, "--trials", "3"))
     assert result.exit_code == INTERRUPTED
-    assert "interrupted; finished trials are kept in" in result.stderr
+    assert "interrupted; finished trials are saved in" in result.stderr
     assert "best of 1 trials: " in result.stdout
     result = CliRunner().invoke(app, command(tmp_path, "--trials", "3"))
     assert result.exit_code == 0, result.output
@@ -195,7 +191,7 @@ def test_mistakes_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     """A file that is no journal, an actor that is not there, and no Optuna."""
     (tmp_path / "study").mkdir()
     (tmp_path / "study" / JOURNAL).write_text("trials")
-    assert_refused(command(tmp_path), "trials.journal: is no journal of Optuna")
+    assert_refused(command(tmp_path), "trials.journal: no Optuna journal, or damaged")
     assert_refused(command(tmp_path, "--start", str(tmp_path / "none.safetensors")), "none.safetensors")
     monkeypatch.setitem(sys.modules, "optuna", None)
-    assert_refused(command(tmp_path), "pip install 'formation-env[rl,report,optimal]'")
+    assert_refused(command(tmp_path), "needs optuna; in a checkout: pip install -e '.[optimal]', or make")

@@ -8,7 +8,7 @@ from scipy.optimize import linprog
 
 from baselines import make_policy
 from baselines.controllers.mpc import MPC, MPCSettings
-from baselines.optimal.horizon_blocks import block_ends, horizon_end, shared_prices
+from baselines.optimal.horizon_blocks import block_ends, horizon_end, shared_error_weights
 from formation_env import FormationVectorEnv, load_scenario
 from formation_env.dropout import NoDropout
 from formation_env.evaluation.rollout import evaluate
@@ -172,7 +172,7 @@ def test_expected_scatter_keeps_it_from_answering_noise() -> None:
 def test_blocks_end_at_arrivals_and_phases() -> None:
     """They grow from the finest to the coarsest, and neither an arrival nor a phase's end lies inside one."""
     plan = legs(load_scenario("mission"))
-    nodes = block_ends(plan, 5, plan[-1].end, 1, 6, 0.2)
+    nodes = block_ends(plan, 5, plan[-1].end, finest=1, coarsest=6, growth=0.2)
     lengths = np.diff(nodes)
     assert (nodes[0], nodes[-1]) == (5, plan[-1].end)
     assert {plan[0].arrival, plan[0].end, plan[1].arrival} <= set(nodes.tolist())
@@ -188,12 +188,12 @@ def test_horizons_count_hold_time() -> None:
     assert horizon_end(plan, second.end - 40, 100) == second.end
 
 
-def test_shared_prices_are_exact_for_errors_on_a_line() -> None:
+def test_shared_weights_are_exact_for_errors_on_a_line() -> None:
     """The sum over the blocks' ends is the sum over all steps if the error is linear in time."""
     rng = np.random.default_rng(0)
     price, judge = rng.random(61), np.where(np.arange(61) <= 30, 0, 1)
     nodes = np.array([10, 11, 13, 18, 25, 30, 31, 37, 45])
-    shares = shared_prices(price, judge, nodes)
+    shares = shared_error_weights(price, judge, nodes)
     steps = np.arange(11, 46)
     assert shares.sum() == pytest.approx(price[steps].sum(), rel=1e-12)
     late = steps > 31  # beyond the block that begins with the other phase's instant
@@ -207,7 +207,7 @@ def test_shared_prices_are_exact_for_errors_on_a_line() -> None:
             assert (shares * line[1:])[nodes[1:] <= 30].sum() == pytest.approx(moment, rel=1e-12)
 
 
-def test_a_price_on_the_arrival_makes_it_a_constraint() -> None:
+def test_a_weight_on_the_arrival_makes_it_a_constraint() -> None:
     """An exact penalty: above the multiplier the plan is at the target on arrival, which it passes 100 m off without.
 
     And where the limit forbids it, there is still a plan, as near as full thrust comes.

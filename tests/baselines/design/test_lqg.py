@@ -3,7 +3,8 @@
 import dataclasses
 
 import numpy as np
-from scipy.linalg import solve_discrete_are, solve_discrete_lyapunov
+from oracles import filter_covariance
+from scipy.linalg import solve_discrete_lyapunov
 
 from baselines import make_policy
 from formation_env import FormationVectorEnv, load_scenario
@@ -35,9 +36,8 @@ def joint_covariance(scenario: Scenario, K: Array) -> Array:
     """
     model, sensor, identity = scenario.filter_dynamics(), scenario.sensor, np.eye(6)
     Phi, G = model.Phi, model.Gamma
-    noise = SIGMA_W**2 * G @ G.T
     R_noise = np.diag(np.repeat([sensor.sigma_pos_m, sensor.sigma_vel_m_s], 3) ** 2)
-    P = solve_discrete_are(Phi.T, identity, noise, R_noise)
+    P = filter_covariance(Phi, SIGMA_W * G, identity, R_noise)
     L = P @ np.linalg.inv(P + R_noise)
     loop = np.block([[Phi - G @ K, G @ K], [np.zeros((6, 6)), (identity - L) @ Phi]])
     push = np.vstack([G, (identity - L) @ G])

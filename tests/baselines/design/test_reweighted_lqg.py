@@ -4,19 +4,27 @@ import dataclasses
 
 import numpy as np
 import pytest
-from scipy.linalg import solve_discrete_are
+from oracles import filter_covariance
 from scipy.optimize import linprog
 from scipy.sparse import coo_matrix, csr_matrix, eye, hstack, kron, vstack
 
 from baselines import make_policy
 from baselines.design.phase_tables import nominal_start, start_error
-from baselines.design.reweighted_lqg import Knowledge, ReweightedLQGSettings, knowledge, reweighted_gains, spread
+from baselines.design.reweighted_lqg import (
+    Knowledge,
+    ReweightedLQGSettings,
+    error_weights,
+    knowledge,
+    reweighted_gains,
+    spread,
+)
 from formation_env import FormationVectorEnv, load_scenario
 from formation_env.dropout import NoDropout
 from formation_env.evaluation.rollout import evaluate
 from formation_env.navigation.sensor import Sensor
+from formation_env.task.reward import Reward
 from formation_env.task.scenario import Scenario, Start
-from formation_env.task.schedule import leg_reference, legs
+from formation_env.task.schedule import build_schedule, column, leg_reference, legs
 
 
 def test_knowledge_settles_at_the_riccati_equation() -> None:
@@ -26,7 +34,7 @@ def test_knowledge_settles_at_the_riccati_equation() -> None:
         scenario = dataclasses.replace(keeping, sensor=Sensor(measures=measures))
         model, H = scenario.filter_dynamics(), np.eye(count, 6)
         R_noise = np.diag(np.repeat([2.0, 0.02], 3)[:count] ** 2)
-        P = solve_discrete_are(model.Phi.T, H.T, 1e-8 * model.Gamma @ model.Gamma.T, R_noise)
+        P = filter_covariance(model.Phi, 1e-4 * model.Gamma, H, R_noise)
         gain = P @ H.T @ np.linalg.inv(H @ P @ H.T + R_noise)
         known = knowledge(scenario, model)
         np.testing.assert_allclose(known.missed[-1], (np.eye(6) - gain @ H) @ P, rtol=1e-3, atol=1e-9)
@@ -53,6 +61,22 @@ def test_a_perfect_sensor_leaves_nothing_unknown(dt_s: float) -> None:
         known.learned[1:], np.tile(Q_noise, (scenario.num_steps, 1, 1)), atol=1e-9 * Q_noise.max()
     )
     assert np.isfinite(reweighted_gains(scenario, ReweightedLQGSettings(rounds=0))[0]).all()
+
+
+def test_phases_weigh_errors_as_the_environment_scores_them() -> None:
+    """Together the phases weigh each instant once, as the schedule does; none weighs its first, which it cannot change.
+
+    The first instant of a phase ends a step of the phase before (the first of all ends none), whatever errors on the
+    way cost.
+    """
+    mission = load_scenario("mission")
+    scenario = dataclasses.replace(mission, reward=Reward(error_weight=0.02, transfer_error_weight=0.003))
+    total = np.zeros(scenario.num_steps + 1)
+    for leg in legs(scenario):
+        weights = error_weights(scenario, leg)
+        assert weights[0] == 0
+        total[leg.start : leg.end + 1] += weights
+    np.testing.assert_array_equal(total, column(build_schedule(scenario), "error_weight"))
 
 
 def test_predicted_scatter_is_what_is_flown() -> None:

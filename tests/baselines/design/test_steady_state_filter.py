@@ -1,12 +1,13 @@
 """Where the compiled filter goes: to python-control's gains with its own model, and astray with a wrong one."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
 from env_helpers import Array, covariances, fly_rows
-from oracles import hcw_state_matrix
-from scipy.linalg import expm, solve_discrete_are
+from oracles import filter_covariance, hcw_state_matrix
+from scipy.linalg import expm
 
 from baselines import stationary_filter
 from formation_env import FormationVectorEnv, Scenario, load_scenario
@@ -50,18 +51,33 @@ def test_compiled_filter_settles_at_python_controls_covariance(scenario: Scenari
 
 
 @pytest.mark.parametrize("scenario", SETTLING.values(), ids=SETTLING.keys())
-def test_stationary_gain_agrees_with_scipy(scenario: Scenario) -> None:
-    """K = P H' (H P H' + R)^-1 with P of scipy's Riccati solver, dual to the regulator's (Ma 2009, eq. 4.71)."""
+def test_stationary_gain_agrees_with_the_doubling_algorithm(scenario: Scenario) -> None:
+    """K = P H' (H P H' + R)^-1 with P by doubling, dual to the regulator's (Ma 2009, eq. 4.71)."""
     model, filter_model = scenario.filter_dynamics(), scenario.filter_model
     H = np.eye(6)[: 3 if scenario.sensor.measures == "position" else 6]
     R_noise = np.diag(np.repeat([filter_model.sigma_pos_m, filter_model.sigma_vel_m_s], 3)[: len(H)] ** 2)
-    P = solve_discrete_are(model.Phi.T, H.T, filter_model.process_noise_m_s2**2 * model.Gamma @ model.Gamma.T, R_noise)
+    P = filter_covariance(model.Phi, filter_model.process_noise_m_s2 * model.Gamma, H, R_noise)
     ours = stationary_filter(scenario)
     sigma = np.sqrt(np.diag(P))
     np.testing.assert_allclose(ours.predicted, P, rtol=0, atol=1e-6 * np.outer(sigma, sigma).max())
     expected = P @ H.T @ np.linalg.inv(H @ P @ H.T + R_noise)
     unit = sigma[:, None] / np.sqrt(np.diag(R_noise))
     np.testing.assert_allclose(ours.gain / unit, expected / unit, atol=1e-6)
+
+
+@pytest.mark.parametrize("dt_s", [1.0, 10.0, 600.0])
+@pytest.mark.parametrize("altitude_m", [200e3, 20000e3])
+def test_filter_settles_at_any_noise_and_step(dt_s: float, altitude_m: float) -> None:
+    """90 combinations, of which every tenth failed in SI units: P = Phi (P - K H P) Phi' + Q_noise to 1e-9."""
+    scenario = dataclasses.replace(steady("keeping", dynamics="hcw"), dt_s=dt_s, orbit=Orbit(altitude_m=altitude_m))
+    for noise, sigma_pos_m, sigma_vel_m_s in itertools.product((1e-9, 1e-5, 0.1), (1e-3, 0.1, 1e3), (None, 1e-5, 0.02)):
+        measures = "position_and_velocity" if sigma_vel_m_s else "position"
+        sensor = Sensor(measures=measures, sigma_pos_m=sigma_pos_m, sigma_vel_m_s=sigma_vel_m_s or 1.0)
+        case = dataclasses.replace(scenario, process_noise_m_s2=noise, sensor=sensor)
+        settled, model = stationary_filter(case), case.filter_dynamics()
+        sigma = np.sqrt(np.diag(settled.predicted))
+        again = model.Phi @ settled.updated @ model.Phi.T + noise**2 * model.Gamma @ model.Gamma.T
+        np.testing.assert_allclose((again - settled.predicted) / np.outer(sigma, sigma), 0, atol=1e-9)
 
 
 @pytest.mark.parametrize(

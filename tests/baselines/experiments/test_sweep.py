@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from baselines.__main__ import app
+from baselines.cli import app
 from baselines.controllers.registry import make_policy
 from baselines.experiments.policy_factories import Classical
 from baselines.experiments.sweep import BOUND, COLUMNS, METRICS, Point, mean_hold_error_m, points
@@ -297,7 +297,7 @@ def test_the_reading_names_who_costs_least() -> None:
     [
         (["nowhere"], "no scenario named 'nowhere'"),
         (["keeping", "--policy", "lqg"], "no policy named 'lqg'"),
-        (["keeping", "--env", "keeping"], "two environments are called 'keeping'"),
+        (["keeping", "keeping"], "two environments are called 'keeping'"),
     ],
 )
 def test_a_mistake_is_one_line(arguments: list[str], named: str, tmp_path: Path) -> None:
@@ -313,8 +313,8 @@ def test_a_missing_solver_is_one_line(tmp_path: Path, monkeypatch: pytest.Monkey
     """Without the extra of the bound the command says what to install, before it flies."""
     monkeypatch.setitem(sys.modules, "clarabel", None)
     run = CliRunner().invoke(app, ["sweep", "keeping", "--out", str(tmp_path)])
-    assert run.exit_code == 1
-    assert run.stderr == "sweep: needs clarabel; install it with: pip install 'formation-env[optimal]'\n"
+    assert run.exit_code == 2
+    assert run.stderr == "error: needs clarabel; in a checkout: pip install -e '.[optimal]', or make\n"
     assert not list(tmp_path.iterdir())
 
 

@@ -7,27 +7,37 @@ import numpy as np
 import pytest
 
 from baselines.experiments import parallel
-from baselines.thesis import plan, scenarios
-from baselines.thesis.claims import noise_grid, table
+from baselines.thesis import figure_flights, scenarios
+from baselines.thesis.claims import claims_table, noise_grid
 from baselines.thesis.claims.conclusions import least_fuel_m_s
-from baselines.thesis.claims.flights import Effort, Noise
 from baselines.thesis.claims.readings import READINGS
+from baselines.thesis.claims.shared_flights import ClaimOptions, Noise
 from baselines.thesis.claims.tuned_comparison import LAWS, candidates
 from baselines.thesis.claims.verdict import Between, Statement
-from baselines.thesis.jobs import Job
+from baselines.thesis.flight_job import FlightJob
 from formation_env.task.loading import load_scenario
 
-TINY = Effort(seeds=2, dt_s=60.0, periods=2, coarse_dt_s=60.0, grid_dt_s=60.0, truths=("modified_hcw",), candidates=2)
+TINY = ClaimOptions(
+    seeds=2, dt_s=60.0, periods=2, coarse_dt_s=60.0, grid_dt_s=60.0, truths=("modified_hcw",), candidates=2
+)
 QUIET = Noise(0.0, 0.0, 0.0, 0.0)
 
 
-def said(wanted: Between) -> Statement:
+def stated(expected: Between) -> Statement:
     """A statement about a number."""
-    return Statement("5", "a sentence", "a value", "{} m", wanted, "an assumption", "an explanation")
+    return Statement(
+        section="5",
+        sentence="a sentence",
+        thesis_value="a value",
+        quantity="{} m",
+        expected=expected,
+        assumption="an assumption",
+        explanation="an explanation",
+    )
 
 
 @pytest.mark.parametrize(
-    ("wanted", "low", "high", "verdict"),
+    ("expected", "low", "high", "verdict"),
     [
         (Between(high=300.0), 290.0, 299.0, "holds"),
         (Between(high=300.0), 299.0, 301.0, "cannot be decided"),
@@ -41,30 +51,32 @@ def said(wanted: Between) -> Statement:
         (Between(high=300.0), math.nan, math.nan, "cannot be decided"),
     ],
 )
-def test_a_sentence_holds_where_its_whole_interval_does(wanted: Between, low: float, high: float, verdict: str) -> None:
+def test_a_sentence_holds_where_its_whole_interval_does(
+    expected: Between, low: float, high: float, verdict: str
+) -> None:
     """The verdict is the interval's place against the limits, by hand; no number decides nothing."""
-    assert wanted.verdict(low, high) == verdict
+    assert expected.verdict(low, high) == verdict
 
 
 def test_the_interval_of_a_claim_is_the_mean_s() -> None:
     """For 400 normal numbers the bootstrap gives 1.96 sigma / sqrt(400) about the mean; 20 % of that is its scatter."""
     values = 10.0 + np.random.default_rng(1).normal(size=400)
-    claim = said(Between(high=10.2)).judge(values)
+    claim = stated(Between(high=10.2)).decide(values)
     assert claim.low is not None
     assert claim.high is not None
     assert (claim.high - claim.low) / 2 == pytest.approx(1.96 / 20, rel=0.2)
     assert (claim.high + claim.low) / 2 == pytest.approx(values.mean(), abs=0.01)
     assert claim.verdict == "holds"
-    assert f"as said in {np.sum(values < 10.2)} of 400 seeds" in claim.ours
+    assert f"as stated in {np.sum(values < 10.2)} of 400 seeds" in claim.ours
 
 
 def test_a_lone_number_has_no_interval_and_an_undecided_one_says_so() -> None:
     """Noise-free flights decide by their number; where the interval straddles the limit the table says why."""
-    lone = said(Between(high=30.0)).judge(np.array([26.6]))
+    lone = stated(Between(high=30.0)).decide(np.array([26.6]))
     assert (lone.low, lone.high, lone.verdict, lone.ours) == (None, None, "holds", "26.6 m")
-    straddling = said(Between(high=0.0)).judge(np.array([-1.0, 1.0, -2.0, 2.0]))
+    straddling = stated(Between(high=0.0)).decide(np.array([-1.0, 1.0, -2.0, 2.0]))
     assert straddling.verdict == "cannot be decided"
-    assert straddling.explanation.startswith("The interval reaches over the limit.")
+    assert straddling.explanation.startswith("The interval contains the limit.")
 
 
 @pytest.mark.parametrize(("periods", "error_m", "limit_m_s2"), [(0.5, 26.6, 0.02), (0.1, 132.8, 0.08)])
@@ -74,7 +86,7 @@ def test_the_initialization_comes_out_as_printed(periods: float, error_m: float,
     With P of the scalar Riccati equation, K2 / K1 = sqrt(2) r^(1/4), r = 0.5 / n^2; the Coriolis force, left out
     there, is worth 1 % of it. The two greatest errors were found by another program.
     """
-    flights = plan.initializations()[f"initialization {periods:g}"].run(lambda cost: None)
+    flights = figure_flights.initializations()[f"initialization {periods:g}"].run(lambda cost: None)
     assert flights.max_error()[0, 0] == pytest.approx(error_m, abs=0.1)
     assert flights.max_accel()[0, 0] < limit_m_s2
     orbit = flights.scenario.orbit
@@ -90,8 +102,8 @@ def test_the_misprinted_frequency_gives_the_thesis_s_300_m() -> None:
     of the error is |k^2 - n^2| Z / |K1 + k^2 - n^2 + j n K2|. Air and the step of 1 s, left out, are worth less than
     0.5 %.
     """
-    scenario = replace(plan.printed(QUIET.on(scenarios.keeping(1.0))))
-    flights = Job(scenario, (plan.LQR,), (0,), every=100).run(lambda cost: None)
+    scenario = replace(figure_flights.printed(QUIET.on(scenarios.keeping(1.0))))
+    flights = FlightJob(scenario, (figure_flights.LQR,), (0,), every=100).run(lambda cost: None)
     n, k, r = 1.08308e-3, 1.42216e-3, 12000 / 1.08308e-3**2
     z_m = math.hypot(2000 * math.sqrt(3), 0.2 * math.sqrt(3) / n)
     K1 = math.sqrt(k**4 + 1 / r) - k**2
@@ -120,26 +132,26 @@ def test_both_laws_are_tuned_over_as_many_candidates() -> None:
 
 def test_a_claim_counts_its_sentence_over_the_noise_levels() -> None:
     """The row of the table says how often its own sentence holds in the grid, and no other sentence's verdicts."""
-    claim = said(Between(high=1.0)).judge(np.array([0.5]))
+    claim = stated(Between(high=1.0)).decide(np.array([0.5]))
     other = replace(claim, sentence="another sentence", verdict="fails")
-    judged = [(TINY, claim), (TINY, replace(claim, verdict="fails")), (TINY, claim), (TINY, other)]
-    assert noise_grid.with_levels(claim, judged).assumption == (
+    decided = [(TINY, claim), (TINY, replace(claim, verdict="fails")), (TINY, claim), (TINY, other)]
+    assert noise_grid.with_levels(claim, decided).assumption == (
         "an assumption. Over 3 noise levels: holds at 2, fails at 1"
     )
-    assert noise_grid.with_levels(replace(claim, sentence="no such"), judged).assumption == "an assumption"
+    assert noise_grid.with_levels(replace(claim, sentence="no such"), decided).assumption == "an assumption"
 
 
 @pytest.fixture(scope="module")
-def tiny() -> table.Tables:
+def tiny() -> claims_table.ClaimTables:
     """The whole table, with two seeds, long steps and two noise levels."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(noise_grid, "LEVELS", (Noise(0.02, 0.0, 10.0, 0.02), Noise(20.0, 5e-5)))
-        wanted = table.jobs(TINY)
-        flown = parallel.run(wanted, lambda cost: None, 1)  # type: ignore[arg-type]
-        return table.tables(flown, TINY)
+        jobs = claims_table.claim_jobs(TINY)
+        flown = parallel.run(jobs, lambda cost: None, 1)  # type: ignore[arg-type]
+        return claims_table.tables(flown, TINY)
 
 
-def test_every_claim_says_all(tiny: table.Tables) -> None:
+def test_every_claim_says_all(tiny: claims_table.ClaimTables) -> None:
     """Each row has the thesis's value, ours, what it rests on and why; no section is missing."""
     optional = {"low", "high"}
     for claim in tiny.claims:
@@ -151,7 +163,7 @@ def test_every_claim_says_all(tiny: table.Tables) -> None:
     assert len(set(sentences)) == len(sentences) >= 45
 
 
-def test_the_verdicts_of_the_table_are_those_of_its_intervals(tiny: table.Tables) -> None:
+def test_the_verdicts_of_the_table_are_those_of_its_intervals(tiny: claims_table.ClaimTables) -> None:
     """A claim of a ratio above 60 % holds if its interval does: recomputed here from the printed interval."""
     claim = next(c for c in tiny.claims if "60 %" in c.sentence)
     assert claim.low is not None
@@ -160,17 +172,17 @@ def test_the_verdicts_of_the_table_are_those_of_its_intervals(tiny: table.Tables
     assert claim.verdict == expected
 
 
-def test_the_grid_has_each_sentence_at_each_level(tiny: table.Tables) -> None:
-    """Every sentence of the grid is judged at both levels and at the long one, and stands in the table too."""
+def test_the_grid_has_each_sentence_at_each_level(tiny: claims_table.ClaimTables) -> None:
+    """Every sentence of the grid is decided at both levels and at the long one, and stands in the table too."""
     counts = tiny.noise.groupby(["section", "sentence"]).size()
     assert (counts == 3).all()
     table = {(claim.section, claim.sentence) for claim in tiny.claims}
     assert set(counts.index) <= table
 
 
-def test_readings_and_comparison_are_complete(tiny: table.Tables) -> None:
+def test_readings_and_comparison_are_complete(tiny: claims_table.ClaimTables) -> None:
     """One line per reading; per truth, failure and price one of the comparison, with the interval about the mean."""
-    assert list(tiny.readings["reading"]) == [reading.words for reading in READINGS]
+    assert list(tiny.readings["reading"]) == [reading.text for reading in READINGS]
     assert len(tiny.fair) == len(TINY.truths) * 2 * 4
     assert (tiny.fair["low"] <= tiny.fair["smc_minus_lqr_m_s"]).all()
     assert (tiny.fair["smc_minus_lqr_m_s"] <= tiny.fair["high"]).all()

@@ -1,6 +1,7 @@
 """The thesis's figures: they draw what was flown, the numbers behind them are the printed ones, and files are whole."""
 
 import base64
+import html
 import json
 import re
 import signal
@@ -15,15 +16,17 @@ import pandas as pd
 import pytest
 from typer.testing import CliRunner
 
-from baselines.__main__ import app
+from baselines.cli import app
 from baselines.controllers.registry import make_policy
 from baselines.experiments import parallel
-from baselines.thesis import plan, report, scenarios, tables
-from baselines.thesis.claims import table
+from baselines.thesis import claim_files, figure_flights, scenarios, write_thesis
+from baselines.thesis.claims import claims_table
 from baselines.thesis.claims.claim import Claim
 from baselines.thesis.figures import FIGURES, drawings, orbits, style
-from baselines.thesis.flights import Flights, desired_path, fly
-from baselines.thesis.report_page import Content, Picture, render
+from baselines.thesis.flight_recorder import desired_path
+from baselines.thesis.fly_laws import fly_laws
+from baselines.thesis.recorded_flights import Flights
+from baselines.thesis.thesis_page import Content, Picture, render, verdict_summary
 from formation_env import load_scenario
 from formation_env.evaluation.rollout import evaluate
 from formation_env.formations import Following, InTrack
@@ -33,9 +36,10 @@ from formation_env.task.scenario import Limits
 
 ROOT = Path(__file__).parents[3]
 COARSE_S = 30.0
+FACTS = {"command": "c", "episodes": 1, "step_s": "1", "step_warning": "", "versions": {"python": "3"}}
 PRINTED_START = [2000, 369.3, 3464.1, 0.2, -4.3, 0.3]
 CLAIM = Claim("5.2.1", "a < b & c", "< 30 m", "26.6 m", 26.5, None, "holds", "T = 1 s", "the lag")
-TABLES = table.Tables(
+TABLES = claims_table.ClaimTables(
     [CLAIM],
     noise=pd.DataFrame([{"section": "5.2.2", "low": 0.123456, "high": np.nan}]),
     readings=pd.DataFrame([{"reading": "k <printed>", "gives_the_figures": True}]),
@@ -46,7 +50,7 @@ TABLES = table.Tables(
 @pytest.fixture(scope="module")
 def flown() -> dict[str, Flights]:
     """All flights of the figures in little: coarse steps, two seeds, little more than two periods of keeping."""
-    return parallel.run(plan.jobs(range(2), COARSE_S, periods=2.3), lambda cost: None, workers=1)
+    return parallel.run(figure_flights.figure_jobs(range(2), COARSE_S, periods=2.3), lambda cost: None, workers=1)
 
 
 # What is flown.
@@ -88,7 +92,7 @@ def test_sums_are_those_of_evaluate() -> None:
     """Whatever is kept of a flight, its sums and maxima are evaluate's, over transfer and hold together or apart."""
     scenario, seeds = replace(load_scenario("keeping"), dt_s=COARSE_S), [5, 6, 7]
     policies = [make_policy(name, scenario) for name in ("lqr", "zero")]
-    flights = fly(policies, scenario, seeds, every=50)
+    flights = fly_laws(policies, scenario, seeds, every=50)
     for index, policy in enumerate(policies):
         table = evaluate(policy, scenario, seeds)
         # Sums in another order differ by rounding; maxima are kept in single precision.
@@ -102,7 +106,7 @@ def test_sums_are_those_of_evaluate() -> None:
 def test_what_is_kept_changes_no_sum(flown: Mapping[str, Flights]) -> None:
     """Coarser instants are a subset of the finer ones, and windows add up to the whole."""
     scenario = scenarios.mission(COARSE_S)
-    every = [fly([plan.MISSION.make(scenario)], scenario, [1], every=step) for step in (1, 77)]
+    every = [fly_laws([figure_flights.MISSION.make(scenario)], scenario, [1], every=step) for step in (1, 77)]
     np.testing.assert_array_equal(every[0].truth[every[1].steps], every[1].truth)
     assert set(every[1].steps) >= {0, scenario.steps(5.05), scenario.steps(1), scenario.num_steps}
     for quantity in ("delta_v", "effort", "mean_error", "max_error", "max_accel"):
@@ -110,7 +114,7 @@ def test_what_is_kept_changes_no_sum(flown: Mapping[str, Flights]) -> None:
         np.testing.assert_allclose(coarse, fine, rtol=1e-12)
     apart = every[1].delta_v(4) + every[1].delta_v(start=4)
     np.testing.assert_allclose(apart, every[1].delta_v(), rtol=1e-12)
-    with pytest.raises(ValueError, match=r"0\.123 periods after the start was not kept"):
+    with pytest.raises(ValueError, match=r"0\.123 periods after the start was not recorded"):
         every[1].index(0.123)
 
 
@@ -138,7 +142,9 @@ def test_axes_bound_the_magnitude(flown: Mapping[str, Flights]) -> None:
 def test_nothing_is_told_of_what_was_not_flown() -> None:
     """After an early end everything is NaN, so that no mean can hide it; the other policy goes on."""
     scenario = replace(scenarios.reconfiguration(dt_s=COARSE_S), limits=Limits(max_distance_m=1700.0))
-    flights = fly([make_policy("zero", scenario), plan.RECONFIGURATION.make(scenario)], scenario, [0], every=7, few=1)
+    flights = fly_laws(
+        [make_policy("zero", scenario), figure_flights.RECONFIGURATION.make(scenario)], scenario, [0], every=7, few=1
+    )
     ended = int(np.isnan(flights.position_error_m[:, 0, 0]).argmax())
     assert 0 < ended < len(flights.steps)
     for values in (flights.position_error_m, flights.accel_m_s2, flights.truth, flights.estimate, flights.thrust_m_s2):
@@ -151,7 +157,11 @@ def test_nothing_is_told_of_what_was_not_flown() -> None:
 
 def test_processes_fly_the_same() -> None:
     """Two processes give, bit for bit, what one gives, and all progress arrives."""
-    wanted = {name: job for name, job in plan.jobs(range(2), 60.0, 0.1).items() if "error" in name or "0.1" in name}
+    wanted = {
+        name: job
+        for name, job in figure_flights.figure_jobs(range(2), 60.0, 0.1).items()
+        if "error" in name or "0.1" in name
+    }
     apart: list[int] = []
     here, there = parallel.run(wanted, lambda cost: None, 1), parallel.run(wanted, apart.append, 2)
     assert here.keys() == there.keys() == wanted.keys()
@@ -169,7 +179,7 @@ def test_initialization_is_the_printed_one(periods: float, error_m: float, accel
 
     The errors to 0.1 m are those of an independent prototype of the trajectory-following law (eq. 4.17-4.19).
     """
-    flights = plan.initializations()[f"initialization {periods:g}"].run(lambda cost: None)
+    flights = figure_flights.initializations()[f"initialization {periods:g}"].run(lambda cost: None)
     assert flights.max_error()[0, 0] == pytest.approx(error_m, abs=0.1)
     assert flights.max_accel()[0, 0] < accel_m_s2
 
@@ -180,8 +190,8 @@ def test_keeping_is_the_printed_one() -> None:
     In closed form: k^2 - n^2 times 3464 m is 2.94e-3 m/s^2, which LQR's stiffness n / sqrt(a) answers by about 300 m.
     The rest of the effort undoes the unknown start.
     """
-    job = plan.keepings((0,), periods=1.0)["keeping"]
-    flights = replace(job, laws=(plan.LQR,)).run(lambda cost: None)
+    job = figure_flights.keepings((0,), periods=1.0)["keeping"]
+    flights = replace(job, laws=(figure_flights.LQR,)).run(lambda cost: None)
     assert flights.max_error()[0, 0] == pytest.approx(300.0, rel=0.02)
     assert flights.max_accel()[0, 0] < 4e-3
     assert flights.effort()[0, 0, 2] > 0.9 * flights.effort()[0, 0].sum()
@@ -243,18 +253,21 @@ def test_four_panels_show_the_flight(flown: Mapping[str, Flights]) -> None:
 def folder(tmp_path_factory: pytest.TempPathFactory, flown: dict[str, Flights]) -> Path:
     """All files of those flights."""
     out = tmp_path_factory.mktemp("thesis") / "deep" / "folder"
+    write_thesis.ThesisOptions(episodes=2, step_s=COARSE_S, periods=2.3, models=False)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(report.parallel, "run_with_bar", lambda wanted, workers: flown)
-        patch.setattr(table, "tables", lambda flown, effort: TABLES)
-        page = report.write_thesis(out, report.Wanted(2, COARSE_S, 2.3, models=False), "the <command>", 1)
-    assert page == out / report.PAGE
+        patch.setattr(write_thesis.parallel, "run_with_bar", lambda wanted, workers: flown)
+        patch.setattr(claims_table, "tables", lambda flown, options: TABLES)
+        page = write_thesis.write_thesis(
+            out, write_thesis.ThesisOptions(episodes=2, step_s=COARSE_S, periods=2.3, models=False), "the <command>", 1
+        )
+    assert page == out / write_thesis.PAGE
     return out
 
 
 def test_all_files_and_nothing_else(folder: Path) -> None:
     """PNG and SVG of each figure, the page, the claims; no temporaries."""
     images = {f"figure-{number.replace('.', '-')}.{kind}" for number in FIGURES for kind in ("png", "svg")}
-    images |= {report.PAGE, "claims.json"}
+    images |= {write_thesis.PAGE, "claims.json"}
     images |= {f"{name}.csv" for name in ("claims", "readings", "noise", "fair")}
     assert {path.name for path in folder.iterdir()} == images
     for path in folder.glob("*.png"):
@@ -263,7 +276,7 @@ def test_all_files_and_nothing_else(folder: Path) -> None:
 
 def test_page_holds_every_figure_and_loads_nothing(folder: Path) -> None:
     """Each figure's own file stands in the page beside its sentence; no address leads out of it."""
-    page = (folder / report.PAGE).read_text(encoding="utf-8")
+    page = (folder / write_thesis.PAGE).read_text(encoding="utf-8")
     embedded = [base64.b64decode(code) for code in re.findall(r"data:image/svg\+xml;base64,([^\"]+)", page)]
     files = [(folder / f"figure-{number.replace('.', '-')}.svg").read_bytes() for number in FIGURES]
     assert embedded == files
@@ -284,23 +297,63 @@ def test_claims_come_back_from_their_files(folder: Path) -> None:
     (entry,) = json.loads((folder / "claims.json").read_text(encoding="utf-8"))
     assert Claim(**entry) == CLAIM
     pd.testing.assert_frame_equal(pd.read_csv(folder / "noise.csv", dtype={"section": str}), TABLES.noise)
-    page = (folder / report.PAGE).read_text(encoding="utf-8")
+    page = (folder / write_thesis.PAGE).read_text(encoding="utf-8")
     for cell in ("a &lt; b &amp; c", "0.123", "–", "k &lt;printed&gt;", "yes", "no"):
         assert f"<td>{cell}</td>" in page
-    assert tables.to_csv([]).strip() == ",".join(table.columns)
+    assert claim_files.to_csv([]).strip() == ",".join(table.columns)
     with pytest.raises(ValueError, match=r"claim 5\.2\.1: verdict must be one of"):
         replace(CLAIM, verdict="maybe")  # type: ignore[arg-type]
 
 
 def test_sections_without_content_are_left_out() -> None:
     """Neither claims nor model errors are announced where there are none; a model error is shown where there is one."""
-    facts = {"command": "c", "episodes": 1, "step_s": "1", "versions": {"python": "3"}}
-    empty = render(Content([]), facts)
+    empty = render(Content([]), FACTS)
     assert "Claims" not in empty
-    assert "linear world" not in empty
-    shown = render(Content([], model_errors=[Picture("", "HCW by size", "", "It grows.", b"<svg/>")]), facts)
-    assert "What the linear world hides" in shown
+    assert "linear models" not in empty
+    shown = render(Content([], model_errors=[Picture("", "HCW by size", "", "It grows.", b"<svg/>")]), FACTS)
+    assert "What the linear models neglect" in shown
     assert "HCW by size" in shown
+
+
+def test_the_verdicts_stand_at_the_top(folder: Path) -> None:
+    """A table of all verdicts, with the number of each by section, comes before the first figure."""
+    page = (folder / write_thesis.PAGE).read_text(encoding="utf-8")
+    assert 0 < page.index('id="verdicts"') < page.index('id="figures"') < page.index("data:image")
+    top = page[page.index('id="verdicts"') : page.index('id="figures"')]
+    assert "a &lt; b &amp; c" in top
+    fails = replace(CLAIM, verdict="fails")
+    later = replace(CLAIM, section="6.1", verdict="cannot be decided")
+    assert verdict_summary([later, CLAIM, fails, CLAIM]) == [
+        ("5.2.1", [2, 1, 0]),
+        ("6.1", [0, 0, 1]),
+        ("all", [2, 1, 1]),
+    ]
+
+
+def test_another_step_than_the_thesis_s_is_said(folder: Path) -> None:
+    """On the page and by the options; with the thesis's step there is nothing to say."""
+    warning = write_thesis.ThesisOptions(step_s=COARSE_S).step_warning
+    assert "30 s instead of the thesis's 1 s" in warning
+    page = (folder / write_thesis.PAGE).read_text(encoding="utf-8")
+    assert html.escape(warning, quote=False).replace("'", "&#39;") in page
+    assert write_thesis.ThesisOptions().step_warning == ""
+    assert "instead of the thesis" not in render(Content([]), FACTS)
+
+
+def test_the_command_warns_of_another_step(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The warning comes before any flight, on standard error."""
+
+    def stop(jobs: object, workers: int) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(write_thesis.parallel, "run_with_bar", stop)
+    for step_s, expected in ((COARSE_S, True), (1.0, False)):
+        options = write_thesis.ThesisOptions(episodes=1, step_s=step_s, claims=False, models=False)
+        with pytest.raises(KeyboardInterrupt):
+            write_thesis.write_thesis(tmp_path, options, "c", 1)
+        assert ("verdicts can differ" in capsys.readouterr().err) is expected
 
 
 def test_a_failure_leaves_the_old_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -311,11 +364,11 @@ def test_a_failure_leaves_the_old_files(folder: Path, monkeypatch: pytest.Monkey
         raise RuntimeError("no ink")
 
     monkeypatch.setitem(FIGURES, "5.27", replace(FIGURES["5.27"], draw=broken))
-    monkeypatch.setattr(report.parallel, "run_with_bar", lambda wanted, workers: {})
+    monkeypatch.setattr(write_thesis.parallel, "run_with_bar", lambda wanted, workers: {})
     for number in list(FIGURES)[:-1]:
         monkeypatch.delitem(FIGURES, number)
     with pytest.raises(RuntimeError, match="no ink"):
-        report.write_thesis(folder, report.Wanted(1), "c", 1)
+        write_thesis.write_thesis(folder, write_thesis.ThesisOptions(episodes=1), "c", 1)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
@@ -326,7 +379,7 @@ def test_command_says_what_is_wrong_in_one_line(tmp_path: Path, monkeypatch: pyt
     """Options out of range are refused before anything is flown; a folder that cannot be written is named."""
     runner = CliRunner()
     for option in ("--episodes", "--step-s", "--processes"):
-        assert runner.invoke(app, ["reproduce", option, "0"]).exit_code == 2
+        assert runner.invoke(app, ["thesis", option, "0"]).exit_code == 2
     blocked = tmp_path / "file"
     blocked.touch()
 
@@ -334,22 +387,22 @@ def test_command_says_what_is_wrong_in_one_line(tmp_path: Path, monkeypatch: pyt
         out.mkdir(parents=True)
         return out
 
-    monkeypatch.setattr(report, "write_thesis", write)
-    result = runner.invoke(app, ["reproduce", "--out", str(blocked / "thesis")])
+    monkeypatch.setattr(write_thesis, "write_thesis", write)
+    result = runner.invoke(app, ["thesis", "--out", str(blocked / "thesis")])
     assert result.exit_code == 1
-    assert result.output.splitlines()[-1] == f"reproduce: {blocked / 'thesis'}: cannot be written: Not a directory"
+    assert result.output.splitlines()[-1] == f"error: {blocked / 'thesis'}: cannot be written: Not a directory"
 
 
 def test_ctrl_c_ends_all_processes_in_one_line(tmp_path: Path) -> None:
     """An interrupt while two processes fly: code 130, one line, nothing written."""
     out = tmp_path / "thesis"
-    command = [sys.executable, "-m", "baselines", "reproduce", "--out", str(out), "--episodes", "2", "--processes", "2"]
+    command = [sys.executable, "-m", "baselines", "thesis", "--out", str(out), "--episodes", "2", "--processes", "2"]
     with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
         process.stderr.read(1)  # the progress bar is there
         process.send_signal(signal.SIGTERM)
         rest = process.stderr.read()
     assert process.returncode == 130
-    assert rest.endswith("reproduce: interrupted, no report written\n")
+    assert rest.endswith("interrupted, no report written\n")
     assert "Traceback" not in rest
     assert not out.exists()

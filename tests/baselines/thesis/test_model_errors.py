@@ -1,4 +1,4 @@
-"""What the linear world hides, against published errors, orders of magnitude that theory gives, and known models."""
+"""Errors of the linear models, against published errors, orders of magnitude that theory gives, and known models."""
 
 import math
 from dataclasses import replace
@@ -6,45 +6,45 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-import truth
+import truth as truth_files
 
 from baselines.thesis.figures import style
-from baselines.thesis.models import closed_loop_costs, conclusions, open_loop_errors, report
+from baselines.thesis.models import closed_loop_costs, model_guide, open_loop_errors, section
 from baselines.thesis.models.open_loop_errors import MODELS, SPANS, Survey, leader
-from baselines.thesis.report_page import Content, render
+from baselines.thesis.thesis_page import Content, render
 from formation_env.formations import Following
 
 HCW, OSCULATING, MEAN, ELLIPTIC = MODELS
-FACTS = {"command": "c", "episodes": 1, "step_s": "1", "versions": {"python": "3"}}
+FACTS = {"command": "c", "episodes": 1, "step_s": "1", "step_warning": "", "versions": {"python": "3"}}
 
 
 @pytest.fixture(scope="module")
 def errors() -> pd.DataFrame:
     """Surveys of the leaders that the sentences speak of."""
-    spoken = [*conclusions.LEADERS.values(), leader(0.0)]
+    spoken = [*model_guide.LEADERS.values(), leader(0.0)]
     bare = [leader(eccentricity=e, j2=False) for e in (0.0, 0.1)]
     return pd.concat([Survey(orbit).run() for orbit in (*spoken, *bare)], ignore_index=True)
 
 
 @pytest.fixture(scope="module")
 def costs() -> pd.DataFrame:
-    """Costs as a flight would give them, made up: the linear world's 1 m/s, twice as much in the others."""
+    """Costs as a flight would give them, made up: 1 m/s on the linear truth, twice as much on the others."""
     lines = [
         (
             comparison.scenario,
-            world,
+            truth,
             law,
             seed,
-            (1.0 if world == closed_loop_costs.LINEAR else 2.0) + 0.1 * seed,
+            (1.0 if truth == closed_loop_costs.LINEAR else 2.0) + 0.1 * seed,
             0.5,
             10.0,
         )
         for comparison in closed_loop_costs.COMPARISONS
-        for world in comparison.worlds()
+        for truth in comparison.truths()
         for law in comparison.laws
         for seed in range(3)
     ]
-    columns = ["scenario", "world", "policy", "seed", "cost_m_s", "delta_v_m_s", "position_error_mean_m"]
+    columns = ["scenario", "truth", "policy", "seed", "cost_m_s", "delta_v_m_s", "position_error_mean_m"]
     return closed_loop_costs.summary(pd.DataFrame(lines, columns=columns))
 
 
@@ -57,8 +57,8 @@ def by_size(errors: pd.DataFrame, model: str, formation: str, span: int) -> pd.S
 @pytest.mark.parametrize(("model", "one_m", "ten_m"), [(HCW, 101, 1011), (OSCULATING, 105, 1053), (MEAN, 22.4, 224)])
 def test_space_circle_errs_as_measured_elsewhere(model: str, one_m: float, ten_m: float) -> None:
     """The thesis's space circle against an independent integrator; its grid of instants is another one, hence 3 %."""
-    _, states = truth.load("space_circle", "j2")
-    found = open_loop_errors.strayed(truth.ORBIT, states[:1])[model]
+    _, states = truth_files.load("space_circle", "j2")
+    found = open_loop_errors.prediction_errors(truth_files.ORBIT, states[:1])[model]
     np.testing.assert_allclose(found[0], [one_m, ten_m], rtol=0.03)
 
 
@@ -89,7 +89,7 @@ def test_follower_at_rest_ahead_lags_by_its_longer_period() -> None:
     energy = 0.5 * (n * radius_m) ** 2 - n**2 * r**3 / radius_m  # it turns with the leader, as a rigid body
     semi_major_axis_m = -(n**2) * r**3 / (2 * energy)
     lag_m = 10 * 2 * math.pi * ((semi_major_axis_m / r) ** 1.5 - 1) * r
-    found = open_loop_errors.strayed(orbit, Following(y0_m=y_m).state(orbit)[None])[HCW]
+    found = open_loop_errors.prediction_errors(orbit, Following(y0_m=y_m).state(orbit)[None])[HCW]
     assert found[0, 1] == pytest.approx(lag_m, rel=0.01)
 
 
@@ -134,27 +134,27 @@ def test_sizes_are_greatest_distances() -> None:
 @pytest.mark.parametrize(("level", "size_m"), [(1.0, 0.0), (8.0, 200.0 * 4.0 ** (1 / 3)), (1e3, math.inf)])
 def test_crossing_of_a_power_law(level: float, size_m: float) -> None:
     """From 4 to 32 while the size goes from 200 to 800 m: 8 is a third of the way, in logarithms."""
-    assert conclusions.crossing(np.array([200.0, 800.0]), np.array([4.0, 32.0]), level) == pytest.approx(size_m)
+    assert model_guide.crossing(np.array([200.0, 800.0]), np.array([4.0, 32.0]), level) == pytest.approx(size_m)
 
 
 def test_trials_fly_all_laws_on_the_same_seeds() -> None:
-    """One line per law and seed; each nonlinear world is one in which something changes."""
+    """One line per law and seed; each nonlinear truth changes something."""
     comparison = replace(closed_loop_costs.COMPARISONS[2], laws=("lqr", "smc"))
-    flown = [closed_loop_costs.Trial(comparison, world, (0, 1)).run() for world in comparison.worlds()]
+    flown = [closed_loop_costs.Trial(comparison, truth, (0, 1)).run() for truth in comparison.truths()]
     table = closed_loop_costs.summary(pd.concat(flown))
     assert len(table) == 2 * 3
-    linear = table[table["world"] == closed_loop_costs.LINEAR]
+    linear = table[table["truth"] == closed_loop_costs.LINEAR]
     assert (linear["more_m_s"] == 0).all()
-    assert (table[table["world"] != closed_loop_costs.LINEAR]["more_m_s"] != 0).all()
+    assert (table[table["truth"] != closed_loop_costs.LINEAR]["more_m_s"] != 0).all()
 
 
 def test_section_stands_on_the_page(errors: pd.DataFrame, costs: pd.DataFrame) -> None:
     """Its sentences, its table and its figures, each with files of its own."""
     contents: dict[str, bytes] = {}
     with style.settings():
-        content = report.shown(Content([]), report.Found(errors, costs), contents)
+        content = section.add_section(Content([]), section.ModelResults(errors, costs), contents)
     page = render(content, FACTS)
-    assert len(content.lessons) == 6
+    assert len(content.model_sentences) == 6
     assert "lqr 90.9 % more" in page  # from 1.1 to 2.1 m/s, means over the seeds
     assert {name for name in contents if name.endswith(".csv")} == {
         f"{name}.csv" for name in ("model_errors", "model_costs", "model_guide")

@@ -1,5 +1,7 @@
 """Dropout models: the statistics of their chains, and their windows."""
 
+from decimal import Decimal
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -105,6 +107,16 @@ def test_the_window_of_the_thesis() -> None:
     """Ma 2009, section 5.2.2: no measurement for the first 3000 s, and at 3000 s there is one again."""
     times = np.array([0.0, 1.0, 2999.0, 2999.999, 3000.0, 3001.0, 1e6])
     np.testing.assert_array_equal(Windows().closed(times), [True, True, True, True, False, False, False])
+
+
+@pytest.mark.parametrize("dt", ["0.1", "0.3", "0.7", "1", "2.3", "4.35", "30", "1e-3"])
+def test_windows_on_whole_steps_begin_and_end_at_these_steps(dt: str) -> None:
+    """Decimal arithmetic says which step; k dt in binary is often just below it."""
+    instants = np.arange(4000) * float(dt)
+    for first, count in ((1, 1), (3, 7), (29, 10), (1000, 1234), (2417, 1)):
+        start, duration = Decimal(dt) * first, Decimal(dt) * count
+        closed = Windows(windows=(Window(start_s=float(start), duration_s=float(duration)),)).closed(instants)
+        np.testing.assert_array_equal(np.flatnonzero(closed), np.arange(first, first + count))
 
 
 def test_windows_join() -> None:

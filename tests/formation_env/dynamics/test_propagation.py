@@ -9,6 +9,7 @@ from oracles import hcw_state_matrix
 from scipy.linalg import expm
 
 from formation_env.dynamics import DYNAMICS
+from formation_env.dynamics.perturbations import Perturbations
 from formation_env.dynamics.propagation import propagate
 from formation_env.dynamics.spacecraft import Spacecraft
 from formation_env.orbital.orbit import Orbit
@@ -129,3 +130,36 @@ def test_unknown_model_is_refused() -> None:
     """The name of the model is checked, too."""
     with pytest.raises(ValueError, match=r"no model named 'kepler'; known: hcw, .*, yamanaka_ankersen"):
         propagate(CIRCLE, [0.0], dynamics="kepler")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"dynamics": "hcw", "orbit": Orbit(altitude_m=2e6, eccentricity=0.1)}, "dynamics: hcw is for circular orbits"),
+        (
+            {"dynamics": "modified_hcw", "perturbations": Perturbations(sun=True)},
+            "perturbations: act in the truth nonlin",
+        ),
+    ],
+)
+def test_what_a_scenario_refuses_is_refused_here(arguments: dict[str, object], message: str) -> None:
+    """A circular model about an ellipse was kilometres off; perturbations of a linear model did nothing."""
+    with pytest.raises(ValueError, match=message):
+        propagate(CIRCLE, [0.0], **arguments)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("batch", [(), (2, 3), (0,)])
+def test_shapes_of_the_nonlinear_truth(batch: tuple[int, ...]) -> None:
+    """Empty batches and no times are allowed."""
+    states = np.zeros((*batch, 6))
+    assert propagate(states, [-5.0, 0.0, 10.0], dynamics="nonlinear").shape == (*batch, 3, 6)
+    assert propagate(states, [], dynamics="nonlinear").shape == (*batch, 0, 6)
+    assert propagate(states, [0.0], dynamics="nonlinear").shape == (*batch, 1, 6)
+
+
+def test_a_follower_that_falls_is_an_error() -> None:
+    """By vis-viva a brake of 300 m/s at 600 km lowers the perigee to below the ground within half an orbit."""
+    with pytest.raises(ValueError, match="follower: re-enters at t = "):
+        propagate([0, 0, 0, 0, -300.0, 0], [6000.0], dynamics="nonlinear")
+    with pytest.raises(ValueError, match=r"follower: must start above 80000 m, got -400000"):
+        propagate([-1e6, 0, 0, 0, 0, 0], [10.0], dynamics="nonlinear")

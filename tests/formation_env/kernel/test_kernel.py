@@ -10,7 +10,7 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from env_helpers import random_actions
+from env_helpers import assert_same, random_actions
 
 import formation_env
 from formation_env import FormationVectorEnv, load_scenario, scenario_names
@@ -202,3 +202,46 @@ def test_reset_writes_the_rows_asked_for_only() -> None:
     assert (guarded[others] == 7.0).all()
     assert np.isfinite(observations[rows]).all()
     assert not (observations[rows] == 7.0).any()
+
+
+def test_read_takes_names_and_rows() -> None:
+    """Results and states alike, of any rows in any order, as copies; a wrong name lists the right ones."""
+    env = FormationVectorEnv(70)
+    env.reset(seed=0)
+    infos = env.step(random_actions(0, 70))[4]
+    simulation, rows = env.simulation, np.array([69, 0, 33])
+    for name, key in (("position_error", "position_error_m"), ("thrust", "accel_m_s2"), ("true_state", "true_state")):
+        np.testing.assert_array_equal(simulation.read(name), infos[key])
+        np.testing.assert_array_equal(simulation.read(name, rows), infos[key][rows])
+        simulation.read(name)[...] = np.nan
+        np.testing.assert_array_equal(simulation.read(name), infos[key])
+    assert simulation.read("measured", rows, bool).dtype == bool
+    assert simulation.read("covariance_in_plane", rows).shape == (3, 10)
+    assert (simulation.read("step") == 1).all()
+    with pytest.raises(KeyError, match=r"unknown name 'positon'; known: thrust, .*true_state"):
+        simulation.read("positon")
+
+
+def test_nobody_outside_the_kernel_knows_its_offsets() -> None:
+    """The environments and all that is built on them read by name."""
+    repository = PACKAGE.parent
+    paths = [
+        path for folder in ("formation_env", "baselines", "agents") for path in (repository / folder).rglob("*.py")
+    ]
+    outside = [path for path in paths if "kernel" not in path.parts and path.name != "jit.py"]
+    assert len(outside) > 100
+    text = {path: path.read_text(encoding="utf-8") for path in outside}
+    assert not [path for path, source in text.items() if "LANES" in source or "kernel import tile" in source]
+
+
+def test_drawing_again_changes_no_flight() -> None:
+    """The noises of a step are read, and the flight goes on as if they were not; twice the same."""
+    env, untouched = FormationVectorEnv(40), FormationVectorEnv(40)
+    env.reset(seed=0)
+    untouched.reset(seed=0)
+    for action in random_actions(1, 3, 40):
+        assert_same(env.step(action), untouched.step(action))
+        for one, other in zip(env.simulation.step_noises(), env.simulation.step_noises(), strict=True):
+            np.testing.assert_array_equal(one, other)
+        some = env.simulation.step_noises(np.array([39, 2]))
+        np.testing.assert_array_equal(some.measurement, env.simulation.step_noises().measurement[[39, 2]])

@@ -60,3 +60,10 @@ def test_no_altitude_after_the_end() -> None:
     settings = (ALTITUDE_M, DENSITY_KG_M3, SCALE_HEIGHT_M, AREA_PER_MASS_M2_KG)
     with pytest.raises(ValueError, match="times_s: must be before the end of the orbit"):
         decayed_altitude_m([0.0, lifetime_s(*settings)], *settings)
+
+
+def test_without_air_nothing_sinks() -> None:
+    """A density of 0 was a division by zero."""
+    assert lifetime_s(ALTITUDE_M, 0.0, SCALE_HEIGHT_M, AREA_PER_MASS_M2_KG) == math.inf
+    path = decayed_altitude_m([0.0, 1e9], ALTITUDE_M, 0.0, SCALE_HEIGHT_M, AREA_PER_MASS_M2_KG)
+    np.testing.assert_array_equal(path, [ALTITUDE_M, ALTITUDE_M])

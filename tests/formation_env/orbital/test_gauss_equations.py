@@ -82,7 +82,8 @@ def test_rates_are_the_derivatives_of_the_elements(elements: Elements, thrust: t
 
 def test_rates_of_classical_elements_need_them_defined() -> None:
     """On a circle or the equator the angles have no rates."""
-    for elements in (Elements(7e6, 0.0, 1.0, 0, 0, 0), Elements(7e6, 0.1, 0.0, 0, 0, 0)):
+    for e, i in ((0.0, 1.0), (0.1, 0.0), (0.1, math.pi), (1e-16, 1.0), (0.1, 1e-14)):  # the last three by rounding
+        elements = Elements(7e6, e, i, 0, 0, 0)
         with pytest.raises(ValueError, match="circular or equatorial"):
             element_rates(elements, [1e-3, 0, 0])
 
@@ -119,3 +120,28 @@ def test_leaving_the_ellipses_is_refused() -> None:
 
     with pytest.raises(ValueError, match="must be on an elliptic orbit"):
         propagate_elements(ORBITS["circular"], [0.0, 7200.0], push)
+
+
+@pytest.mark.parametrize("times", [[], [0.0], [-3.0]])
+def test_no_time_and_one_time(times: list[float]) -> None:
+    """The elements at the first time are those given."""
+    path = propagate_elements(ORBITS["eccentric"], times, pull)
+    assert all(np.shape(field) == (len(times),) for field in path)
+    for found, start in zip(path, ORBITS["eccentric"], strict=True):
+        np.testing.assert_allclose(found, np.full(len(times), start), rtol=1e-12)
+
+
+@pytest.mark.parametrize("times", [[0.0, 0.0], [1.0, 0.0], [0.0, np.nan], 3.0, [[0.0]]])
+def test_times_must_increase(times: object) -> None:
+    with pytest.raises(ValueError, match="times_s: must be finite and increasing"):
+        propagate_elements(ORBITS["circular"], times, pull)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("force", "reason"),
+    [(np.nan, "rates that are not finite at t = 0 s"), (1e200, "step size .* at t = ")],
+)
+def test_a_force_that_cannot_be_integrated_is_an_error(force: float, reason: str) -> None:
+    """The integrator never returned."""
+    with pytest.raises(ValueError, match=f"perturbation: the motion cannot be integrated: .*{reason}"):
+        propagate_elements(ORBITS["circular"], [0.0, 7200.0], lambda time, position, velocity: force * velocity)

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 import formation_env
 from formation_env import FormationEnv, load_scenario
 from formation_env.dropout.windows import Window, Windows
-from formation_env.evaluation.snapshot import save_frame
+from formation_env.rendering.moment import Moment
 from formation_env.rendering.renderer import Renderer
+from formation_env.rendering.scene import Scene, _readable
 
 ACTION = np.array([0.5, -0.5, 0.5], np.float32)
 
@@ -157,17 +158,66 @@ def test_record_video_writes_a_film(tmp_path: Path) -> None:
     assert film.read_bytes()[4:8] == b"ftyp"
 
 
-def test_save_frame_writes_the_last_frame(tmp_path: Path) -> None:
-    """PNG is lossless: the file holds the frame of a flight without thrust; no other file is left."""
-    path = save_frame(tmp_path / "scene.png", "FormationKeeping-v0", steps=2, seed=1)
-    env = FormationEnv("keeping", render_mode="rgb_array")
+def test_the_trail_holds_every_step() -> None:
+    """A frame at the end of a flight equals that of a flight in which every step was drawn."""
+    drawn, once = _started(steps=7), FormationEnv("keeping", render_mode="rgb_array")
+    once.reset(seed=1)
+    for _ in range(7):
+        once.step(ACTION)
+    np.testing.assert_array_equal(once.render(), drawn.render())
+
+
+def test_steps_record_nothing_without_a_render_mode() -> None:
+    """Who does not draw does not pay."""
+    env = FormationEnv("keeping")
     env.reset(seed=1)
-    env.render()
-    for _ in range(2):
-        env.step(np.zeros(3))
-        frame = env.render()
-    assert list(tmp_path.iterdir()) == [path]
-    np.testing.assert_array_equal(np.rint(pyplot.imread(path)[..., :3] * 255), frame)
+    assert env._trail is None
+
+
+@pytest.mark.parametrize("backend", ["inline", "module://matplotlib_inline.backend_inline"])
+def test_human_mode_in_a_notebook_says_so(monkeypatch: pytest.MonkeyPatch, backend: str) -> None:
+    """The inline backend shows a figure once and closes it: refused, with the way out."""
+    monkeypatch.setattr("matplotlib.get_backend", lambda: backend)
+    with pytest.raises(
+        RuntimeError, match=r"\Arender_mode: 'human' needs a display.*still pictures only; use 'rgb_array'"
+    ):
+        FormationEnv("keeping", render_mode="human").reset(seed=1)
+
+
+@pytest.mark.parametrize(
+    ("value", "decimals", "text"),
+    [
+        (0.0, 2, "0.00"),
+        (0.00321, 1, "0.0032"),
+        (0.96, 1, "0.96"),
+        (12.34, 1, "12.3"),
+        (0.0457, 2, "0.046"),
+        (0.457, 2, "0.46"),
+        (4.5e-7, 3, "4.5e-07"),
+        (1.2346, 3, "1.235"),
+    ],
+)
+def test_small_numbers_keep_two_digits(value: float, decimals: int, text: str) -> None:
+    """A good sensor's sigma and a weak thruster's thrust are not shown as zero."""
+    assert _readable(value, decimals) == text
+
+
+def test_a_frame_of_good_sensors_and_weak_thrusters_shows_their_numbers() -> None:
+    """No number of the header but an exact zero is shown as zero."""
+    scenario = load_scenario("keeping")
+    scene = Scene(replace(scenario, spacecraft=replace(scenario.spacecraft, max_accel_m_s2=1e-6)))
+    moment = Moment(
+        step=3,
+        truth=np.zeros(3),
+        estimate=np.zeros(3),
+        covariance=np.diag([1e-6, 1e-6, 1e-6]),
+        thrust=np.array([1.0, 0, 0]),
+        measured=True,
+        age_s=0.0,
+        position_error_m=0.002,
+        delta_v_m_s=3e-5,
+    )
+    assert scene._values(moment)[3:] == ["0.002 m", "0.001 m", "0.001 mm/s²", "3e-05 m/s"]
 
 
 def test_matplotlib_waits_for_the_first_picture() -> None:

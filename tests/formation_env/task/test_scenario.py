@@ -105,6 +105,33 @@ def test_the_leader_is_like_the_follower_if_left_out() -> None:
     assert dataclasses.replace(scenario, leader_spacecraft=heavy).leader == heavy
 
 
+@pytest.mark.parametrize("name", ["keeping", "FormationKeeping-v0"])
+@pytest.mark.parametrize("kind", ["file", "folder"])
+def test_a_shipped_name_wins_over_what_lies_in_the_working_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, kind: str
+) -> None:
+    """A path is what ends in .yaml or .yml."""
+    scenario = load_scenario("keeping")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / name).mkdir() if kind == "folder" else (tmp_path / name).write_text("not a scenario")
+    assert load_scenario(name) == scenario
+
+
+def test_names_that_are_no_names() -> None:
+    """Long, with a null character, with another ending: one line each."""
+    for name, fault in (
+        ("x" * 300, "no scenario named 'xxx"),
+        ("x" * 300 + ".yaml", "cannot be read: File name too long"),
+        ("a\0b", "no scenario named"),
+        ("a\0b.yaml", "cannot be read: .* null"),
+        ("mission.json", "a scenario file must end in .yaml or .yml"),
+        ("somewhere/mission", "a scenario file must end in .yaml or .yml"),
+    ):
+        with pytest.raises(ConfigError, match=fault) as caught:
+            load_scenario(name)
+        assert len(str(caught.value).splitlines()) == 1
+
+
 def test_an_unknown_name_names_its_nearest() -> None:
     """So does a name that resembles none: then all are listed."""
     with pytest.raises(ConfigError, match="no scenario named 'kepping'; did you mean 'keeping'"):
@@ -239,6 +266,10 @@ FAULTS = {
     ),
     "too many steps": (PHASES + "dt_s: 0.001\n", "dt_s: 5801231 steps of 0.001 s; an episode has at most 1000000"),
     "endless hold": (phase(f"{FOLLOWING}, hold_orbits: 1e306"), "dt_s: .* steps of 30 s; an episode has at most .*"),
+    "too much memory": (
+        phase(f"{FOLLOWING}, hold_orbits: 10") + "dynamics: nonlinear\ndt_s: 0.06\n",
+        "dt_s: tables of 966872 steps in all take about 4.45 GB; at most 2 GB, 434782 steps of this scenario",
+    ),
     "dead thruster": (
         PHASES + "spacecraft: {min_accel_m_s2: 1}\n",
         "spacecraft.min_accel_m_s2: must not be above the greatest thrust, 0.1732, got 1",
@@ -266,7 +297,7 @@ FAULTS = {
     "two documents": (PHASES + "---\n" + PHASES, "line 2: no valid YAML: .*another document"),
     "unknown anchor": (PHASES + "sensor: *x\n", "line 2: no valid YAML: found undefined alias 'x'"),
     "code in YAML": (PHASES + "sensor: !!python/object:os.system {}\n", "line 2: no valid YAML: .* constructor .*"),
-    "no such date": (PHASES + "dt_s: 2020-13-45\n", "no valid YAML: month must be in 1..12"),
+    "no such date": (PHASES + "dt_s: 2020-13-45\n", "line 2: no valid YAML: '2020-13-45' is no timestamp: .*"),
     "not UTF-8": (b"title: \xff\xe9\n", "no valid YAML: .*"),
     "control character": (PHASES + 'title: "\x01"\n', "no valid YAML: .*"),
 }

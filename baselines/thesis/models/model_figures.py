@@ -1,4 +1,4 @@
-"""What the linear world hides: errors of the models, and what they cost in closed loop."""
+"""Figures of the linear models' errors, open and closed loop."""
 
 from typing import Any, Final
 
@@ -23,8 +23,8 @@ LOOKS: Final[dict[str, dict[str, Any]]] = dict(
         strict=True,
     )
 )
-"""Of the models; no policy has these colours."""
-WORLDS: Final = {
+"""Line styles of the models; no policy has these colours."""
+TRUTHS: Final = {
     closed_loop_costs.LINEAR: ("#333333", "o"),
     closed_loop_costs.OSCULATING: ("#E69F00", "s"),
     closed_loop_costs.MEAN: ("#009E73", "D"),
@@ -81,14 +81,14 @@ def against_eccentricity(errors: pd.DataFrame, size_m: float, j2: bool) -> Figur
 
 
 def _panels() -> tuple[Figure, dict[str, Axes]]:
-    """A sheet with a panel for each formation, and room for the legend in the last place."""
+    """Make a sheet with a panel for each formation and room for the legend in the last place."""
     figure = style.sheet(5.6)
     grid = figure.subplots(2, 3, sharex=True, sharey=True)
     return figure, dict(zip(FORMATIONS, grid.flat, strict=False))
 
 
 def _finished(figure: Figure, panels: dict[str, Axes], x: str) -> Figure:
-    """Name axes and panels, and put the legend where no panel is."""
+    """Label axes and panels, and put the legend in the empty panel."""
     for formation, axes in panels.items():
         axes.set_title(formation, fontsize=9)
         axes.set_xlabel(x)
@@ -108,7 +108,7 @@ def _choose(errors: pd.DataFrame, model: str, formation: str, span: int) -> pd.D
 
 
 def _lines(axes: Axes, errors: pd.DataFrame, formation: str, span: int, over: str, faint: bool = False) -> None:
-    """A line for each model that knows such leaders; a faint one is not in the legend."""
+    """Draw a line for each applicable model; faint lines are not in the legend."""
     for model, look in LOOKS.items():
         chosen = _choose(errors, model, formation, span).sort_values(over)
         weight: dict[str, Any] = {"alpha": 0.55, "mfc": "none"} if faint else {"label": model}
@@ -116,8 +116,9 @@ def _lines(axes: Axes, errors: pd.DataFrame, formation: str, span: int, over: st
 
 
 def _both_spans(axes: Axes, errors: pd.DataFrame, formation: str, over: str) -> None:
-    """Filled marks after ten orbits, hollow and faint ones after one."""
-    for span, mark in ((SPANS[-1], {}), (SPANS[0], {"mfc": "none", "alpha": 0.55})):
+    """Draw filled marks for ten orbits, hollow and faint ones for one."""
+    marks: dict[int, dict[str, Any]] = {SPANS[-1]: {}, SPANS[0]: {"mfc": "none", "alpha": 0.55}}
+    for span, mark in marks.items():
         label = f"over {span} {'orbit' if span == 1 else 'orbits'}"
         axes.plot([], [], color="#333333", marker="o", ls="", ms=7, label=label, **mark)
     _lines(axes, errors, formation, SPANS[-1], over)
@@ -125,10 +126,10 @@ def _both_spans(axes: Axes, errors: pd.DataFrame, formation: str, over: str) -> 
 
 
 def costs(summary: pd.DataFrame) -> Figure:
-    """Costs of each law in each world, and what they are more than in the linear one, with 95 % intervals.
+    """Costs of each law on each truth, and their increase over the linear one, with 95 % intervals.
 
     Args:
-        summary: of `model_costs.summary`.
+        summary: of `closed_loop_costs.summary`.
     """
     scenarios = list(summary["scenario"].unique())
     counts = [summary[summary["scenario"] == name]["policy"].nunique() for name in scenarios]
@@ -137,7 +138,7 @@ def costs(summary: pd.DataFrame) -> Figure:
     for name, (left, right) in zip(scenarios, grid, strict=True):
         lines = summary[summary["scenario"] == name]
         _intervals(left, lines, ("cost_m_s", "low", "high"))
-        _intervals(right, lines[lines["world"] != closed_loop_costs.LINEAR], ("more_m_s", "more_low", "more_high"))
+        _intervals(right, lines[lines["truth"] != closed_loop_costs.LINEAR], ("more_m_s", "more_low", "more_high"))
         left.set_title(name, fontsize=9, loc="left")
         if lines["cost_m_s"].max() > WIDE * lines["cost_m_s"].min():
             left.set_xscale("log")
@@ -145,20 +146,20 @@ def costs(summary: pd.DataFrame) -> Figure:
             right.set_xscale("symlog", linthresh=1.0)
         right.axvline(0, color=NEUTRAL, lw=0.8)
     style.label(grid[-1, 0], "Cost [m/s]", "")
-    style.label(grid[-1, 1], "More than in the linear world, same seeds [m/s]", "")
+    style.label(grid[-1, 1], "Increase over the linear truth, paired [m/s]", "")
     drawn = {label: mark for axes in grid[:, 0] for mark, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     figure.legend(drawn.values(), drawn.keys(), loc="outside upper center", ncols=3)
     return figure
 
 
 def _intervals(axes: Axes, lines: pd.DataFrame, columns: tuple[str, str, str]) -> None:
-    """A row for each policy, a mark with its interval for each world."""
-    policies, worlds = list(lines["policy"].unique()), list(lines["world"].unique())
-    for rank, world in enumerate(worlds):
-        mine = lines[lines["world"] == world].set_index("policy").loc[policies]
+    """Draw a row for each policy, with a mark and its interval for each truth."""
+    policies, truths = list(lines["policy"].unique()), list(lines["truth"].unique())
+    for rank, truth in enumerate(truths):
+        mine = lines[lines["truth"] == truth].set_index("policy").loc[policies]
         mean, low, high = (mine[column].to_numpy(float) for column in columns)
-        places = [index + 0.22 * (rank - (len(worlds) - 1) / 2) for index in range(len(policies))]
-        color, marker = WORLDS[world]
-        axes.errorbar(mean, places, xerr=(mean - low, high - mean), color=color, fmt=marker, ms=4, label=world)
+        places = [index + 0.22 * (rank - (len(truths) - 1) / 2) for index in range(len(policies))]
+        color, marker = TRUTHS[truth]
+        axes.errorbar(mean, places, xerr=(mean - low, high - mean), color=color, fmt=marker, ms=4, label=truth)
     axes.set_yticks(range(len(policies)), policies)
     axes.set_ylim(len(policies) - 0.5, -0.5)

@@ -1,8 +1,8 @@
-"""What is flown for the figures of chapter 5. To read the thesis's settings in another way, change the constants here.
+"""Flights for the figures of chapter 5. To read the thesis's settings differently, change the constants here.
 
-The thesis does not print all settings, and some of those that it prints do not give its figures. Section 5.2.1 comes
-out with the trajectory-following regulator (eq. 4.17-4.19). The closed loops with noise come out with error-state
-feedback of the printed weights, flown on the dynamics as printed (see `formation_env.dynamics.printed_hcw`).
+The thesis does not print all settings, and some printed ones do not reproduce its figures. Section 5.2.1 is reproduced
+by the trajectory-following regulator (eq. 4.17-4.19), the closed loops with noise by error-state feedback with the
+printed weights on the dynamics as printed (see `formation_env.dynamics.printed_hcw`).
 """
 
 from collections.abc import Sequence
@@ -10,28 +10,28 @@ from dataclasses import replace
 from typing import Final
 
 from baselines.thesis import scenarios
-from baselines.thesis.jobs import Job, Law
+from baselines.thesis.flight_job import FlightJob, Law
 from formation_env.formations import ProjectedCircle
 from formation_env.task.scenario import Scenario
 
 DYNAMICS: Final = "printed_hcw"
-"""Of every flight with noise that does not say otherwise."""
+"""Default dynamics of flights with noise."""
 INITIALIZATION: Final = Law("lqr_quasi_static", "thesis_initialization")
 LQR: Final = Law("lqr", "thesis_keeping")
-FINER_S2: Final = 4150.0
-"""Factor a, a third of the printed one, with which the greatest error is the 175 m of Figure 5.9, s^2."""
-FINER: Final = Law("lqr", "thesis_keeping", FINER_S2)
+TIGHTER_S2: Final = 4150.0
+"""Factor a with the maximum error of Figure 5.9, 175 m; a third of the printed one, s^2."""
+TIGHTER: Final = Law("lqr", "thesis_keeping", TIGHTER_S2)
 TRACKING: Final = Law("lqr_quasi_static", "thesis_keeping")
 SMC: Final = Law("smc", "thesis_keeping")
 SWEEP_S2: Final = (100.0, 300.0, 1000.0, 40000.0, 100000.0, 200000.0)
 """Factors a of the control weight a I / n^2 that, with those of the laws above, reach Figure 5.10's accuracies, s^2."""
-WEIGHTS: Final = (LQR, FINER, *(Law("lqr", "thesis_keeping", factor) for factor in SWEEP_S2))
+WEIGHTS: Final = (LQR, TIGHTER, *(Law("lqr", "thesis_keeping", factor) for factor in SWEEP_S2))
 KEEPING: Final = (*WEIGHTS, SMC)
-MEANT: Final = (LQR, TRACKING)
+CORRECTED: Final = (LQR, TRACKING)
 FAILURE: Final = (LQR, SMC)
-"""Who flies the keeping job of that name."""
+"""Laws of the job `failure`."""
 MANEUVER_S2: Final = 1500.0
-"""Factor a for sections 5.2.4 and 5.2.5, for which none is printed; it gives the 0.06 m/s^2 of Figure 5.20."""
+"""Factor a of sections 5.2.4 and 5.2.5, which print none; it gives the 0.06 m/s^2 of Figure 5.20."""
 RECONFIGURATION: Final = Law("lqr", "thesis_reconfiguration", MANEUVER_S2)
 MISSION: Final = Law("lqr", "thesis_mission", MANEUVER_S2)
 TRANSFER_PERIODS: Final = tuple(round(0.1 * k, 1) for k in range(1, 15))
@@ -44,17 +44,17 @@ MISSION_ENTRY: Final = FAR_ENTRY
 """After the ellipse the follower is on the other side of the leader; the entry near to it gives Figure 5.25."""
 SMALL_VELOCITY_M_S: Final = (2.0, 2.0, 0.0)
 LARGE_VELOCITY_M_S: Final = (30.0, 30.0, 0.0)
-"""Initial velocities on the following orbit, where none would be right; the thesis does not print its own."""
-KEPT_S: Final = 20.0
-"""Time between the instants that are kept of long flights."""
+"""Initial velocities relative to the following orbit; the thesis does not print its own, m/s."""
+RECORD_INTERVAL_S: Final = 20.0
+"""Time between recorded instants of long flights, s."""
 
 
 def printed(scenario: Scenario) -> Scenario:
-    """A scenario on the dynamics as printed."""
+    """Scenario with the dynamics as printed."""
     return replace(scenario, dynamics=DYNAMICS)
 
 
-def jobs(seeds: Sequence[int], dt_s: float | None = None, periods: float = 10.0) -> dict[str, Job]:
+def figure_jobs(seeds: Sequence[int], dt_s: float | None = None, periods: float = 10.0) -> dict[str, FlightJob]:
     """All flights of the figures by name.
 
     Args:
@@ -70,42 +70,42 @@ def jobs(seeds: Sequence[int], dt_s: float | None = None, periods: float = 10.0)
     }
 
 
-def initializations(dt_s: float | None = None) -> dict[str, Job]:
+def initializations(dt_s: float | None = None) -> dict[str, FlightJob]:
     """Section 5.2.1: one flight for each transfer time."""
-    found = {}
+    jobs = {}
     for periods in TRANSFER_PERIODS:
         scenario = scenarios.initialization(periods, dt_s)
-        found[f"initialization {periods:g}"] = Job(scenario, (INITIALIZATION,), (0,), guide="straight_line")
-    return found
+        jobs[f"initialization {periods:g}"] = FlightJob(scenario, (INITIALIZATION,), (0,), guide="straight_line")
+    return jobs
 
 
-def keepings(seeds: tuple[int, ...], dt_s: float | None = None, periods: float = 10.0) -> dict[str, Job]:
+def keepings(seeds: tuple[int, ...], dt_s: float | None = None, periods: float = 10.0) -> dict[str, FlightJob]:
     """Sections 5.2.2 and 5.2.3: keeping the space circle, with and without failure."""
     keeping = scenarios.keeping(periods, dt_s)
     failure = scenarios.keeping_failure(periods, dt_s=dt_s)
     return {
         "keeping": replace(_long(printed(keeping), KEEPING, seeds), measured=True),
-        "meant": _long(keeping, MEANT, seeds),
+        "corrected": _long(keeping, CORRECTED, seeds),
         "failure": replace(_long(printed(failure), FAILURE, seeds), measured=True),
     }
 
 
-def reconfigurations(seeds: tuple[int, ...], dt_s: float | None = None) -> dict[str, Job]:
+def reconfigurations(seeds: tuple[int, ...], dt_s: float | None = None) -> dict[str, FlightJob]:
     """Section 5.2.4: from the following orbit to the projected circle, from better and worse starts."""
     near = printed(scenarios.reconfiguration(dt_s=dt_s))
     far = printed(scenarios.reconfiguration(FAR_ENTRY, dt_s=dt_s))
     slow, fast = (
         tuple(scenarios.with_velocity(near, velocity)) for velocity in (SMALL_VELOCITY_M_S, LARGE_VELOCITY_M_S)
     )
-    crew = (RECONFIGURATION,)
+    laws = (RECONFIGURATION,)
     return {
-        "small position error": Job(near, crew, seeds),
-        "large position error": Job(far, crew, seeds),
-        "small velocity error": Job(near, crew, seeds, start=slow),
-        "large velocity error": Job(near, crew, seeds, start=fast),
+        "small position error": FlightJob(near, laws, seeds),
+        "large position error": FlightJob(far, laws, seeds),
+        "small velocity error": FlightJob(near, laws, seeds, start=slow),
+        "large velocity error": FlightJob(near, laws, seeds, start=fast),
     }
 
 
-def _long(scenario: Scenario, laws: tuple[Law, ...], seeds: tuple[int, ...]) -> Job:
-    """A job of a long scenario, of which not every step is kept."""
-    return Job(scenario, laws, seeds, every=max(1, round(KEPT_S / scenario.dt_s)))
+def _long(scenario: Scenario, laws: tuple[Law, ...], seeds: tuple[int, ...]) -> FlightJob:
+    """Job of a long scenario, of which not every step is recorded."""
+    return FlightJob(scenario, laws, seeds, every=max(1, round(RECORD_INTERVAL_S / scenario.dt_s)))

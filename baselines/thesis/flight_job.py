@@ -1,4 +1,4 @@
-"""Flights as data: what to fly is a table of `Job`s, for `baselines.experiments.parallel`."""
+"""Flights as data: jobs for `baselines.experiments.parallel`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,16 +9,17 @@ import numpy as np
 from baselines.controllers.policy import AccelerationPolicy
 from baselines.design.guidance import GuidanceName
 from baselines.thesis import scenarios
-from baselines.thesis.flights import FEW, Flights, fly
+from baselines.thesis.fly_laws import FEW, fly_laws
+from baselines.thesis.recorded_flights import Flights
 from formation_env.task.scenario import Scenario
 
 _ENVIRONMENT_COST: Final = 2
-"""Time of a batch's step, in steps of one law."""
+"""Duration of a batch's step, in steps of one law."""
 
 
 @dataclass(frozen=True)
 class Law:
-    """A control law with the thesis's gains, see `scenarios.law`.
+    """A control law with the thesis's settings, see `scenarios.law`.
 
     Attributes:
         name: of the policy.
@@ -31,22 +32,22 @@ class Law:
     control_s2: float | None = None
 
     def make(self, scenario: Scenario) -> AccelerationPolicy:
-        """The policy for a scenario."""
+        """Policy for a scenario."""
         return scenarios.law(self.name, scenario, self.shipped, self.control_s2)
 
 
 @dataclass(frozen=True)
-class Job:
-    """One batch of flights; the fields are `fly`'s arguments.
+class FlightJob:
+    """One batch of flights; the fields are the arguments of `fly_laws`.
 
     Attributes:
-        scenario: what is flown.
-        laws: who flies it.
+        scenario: scenario flown.
+        laws: laws that fly it.
         seeds: one per episode of each law.
         guide: the desired path that errors are measured from.
-        every: steps between kept instants.
-        few: seeds whose states are kept.
-        measured: whether their measurements are kept, too.
+        every: steps between recorded instants.
+        few: seeds whose states are recorded.
+        measured: whether their measurements are recorded.
         start: true state (6,) to start at, if not the scenario's.
     """
 
@@ -61,13 +62,13 @@ class Job:
 
     @property
     def cost(self) -> int:
-        """How long it takes, in steps of one law; the number of seeds hardly matters."""
+        """Duration in steps of one law; the number of seeds hardly matters."""
         return self.scenario.num_steps * (_ENVIRONMENT_COST + len(self.laws))
 
     def run(self, progress: Callable[[int], Any]) -> Flights:
-        """Fly it; progress is called with the cost of what was flown since the last call."""
+        """Fly it; progress is called with the cost completed since the last call."""
         share = _ENVIRONMENT_COST + len(self.laws)
-        return fly(
+        return fly_laws(
             [law.make(self.scenario) for law in self.laws],
             self.scenario,
             self.seeds,

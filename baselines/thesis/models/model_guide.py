@@ -1,4 +1,4 @@
-"""When which model is good enough: sentences and a table, all from the numbers."""
+"""Range of validity of the models: sentences and a table, computed from the results."""
 
 from typing import Final
 
@@ -19,9 +19,9 @@ LEADERS: Final = {
     "e = 0.001, 60°": leader(eccentricity=0.001),
     "e = 0.1, 60°": leader(eccentricity=0.1),
 }
-"""Of the table; all under J2."""
+"""Leaders of the table; all under J2."""
 NEAR_M: Final = 1000.0
-"""Size that the sentences speak of."""
+"""Formation size in the sentences, m."""
 
 
 def worst(errors: pd.DataFrame, orbit: Orbit, model: str, span: int) -> pd.Series:
@@ -47,7 +47,7 @@ def crossing(sizes_m: Array, values: Array, level: float) -> float:
 
 
 def good_enough(errors: pd.DataFrame) -> pd.DataFrame:
-    """Greatest size at which no closed formation strays further than an accuracy.
+    """Largest size up to which the error of every closed formation stays below an accuracy.
 
     Returns:
         One line per leader, model, span and accuracy: leader, model, orbits, accuracy_m, size_m; the size is 0 where
@@ -65,32 +65,32 @@ def good_enough(errors: pd.DataFrame) -> pd.DataFrame:
 
 
 def guide(enough: pd.DataFrame) -> pd.DataFrame:
-    """The table of `good_enough` for people: a line for each leader and model."""
+    """Table of `good_enough` for the page: one line per leader and model."""
     lines = []
     for (name, model), group in enough.groupby(["leader", "model"], sort=False):
         line = {"leader": name, "model": model}
-        for row in group.itertuples():
-            span = f"{row.orbits} {'orbit' if row.orbits == 1 else 'orbits'}"
-            line[f"within {row.accuracy_m:g} m over {span}"] = _size(row.size_m)
+        for orbits, accuracy_m, size_m in zip(group["orbits"], group["accuracy_m"], group["size_m"], strict=True):
+            span = f"{orbits} {'orbit' if orbits == 1 else 'orbits'}"
+            line[f"within {accuracy_m:g} m over {span}"] = _size(float(size_m))
         lines.append(line)
     return pd.DataFrame(lines)
 
 
 def _size(size_m: float) -> str:
-    """A greatest size in words."""
+    """Text of a maximum size."""
     if size_m == 0:
         return f"below {SIZES_M[0]:g} m"
     return f"beyond {SIZES_M[-1] / 1e3:g} km" if np.isinf(size_m) else f"{number(float(f'{size_m:.2g}'))} m"
 
 
 def sentences(errors: pd.DataFrame, costs: pd.DataFrame) -> list[str]:
-    """What is learned.
+    """Conclusions in sentences.
 
     Args:
         errors: lines of all surveys.
-        costs: of `model_costs.summary`.
+        costs: of `closed_loop_costs.summary`.
     """
-    return [_circle(errors), _size_parts(errors), _tilt(errors), _ellipse(errors), _feedback(costs), _believed(costs)]
+    return [_circle(errors), _size_parts(errors), _tilt(errors), _ellipse(errors), _feedback(costs), _mismatched(costs)]
 
 
 def _near(errors: pd.DataFrame, orbit: Orbit, model: str, span: int = 1) -> str:
@@ -101,9 +101,11 @@ def _near(errors: pd.DataFrame, orbit: Orbit, model: str, span: int = 1) -> str:
 def _circle(errors: pd.DataFrame) -> str:
     one, ten = ([_near(errors, leader(), model, span) for model in (HCW, OSCULATING, MEAN)] for span in SPANS)
     return (
-        f"Leader on a circle at 600 km and 60°, follower {NEAR_M:g} m away, worst closed formation: over one orbit HCW "
-        f"errs by up to {one[0]} m, modified HCW by {one[1]} m about the osculating orbit and by {one[2]} m about the "
-        f"mean one; over ten orbits by {ten[0]}, {ten[1]} and {ten[2]} m. Yamanaka and Ankersen's model is HCW there."
+        f"With the leader on a circular orbit at 600 km and 60° and the follower {NEAR_M:g} m away, in the worst "
+        f"closed formation HCW errs by up to {one[0]} m over one orbit, modified HCW by {one[1]} m with the osculating "
+        f"mean "
+        f"motion and by {one[2]} m with the mean one; over ten orbits by {ten[0]}, {ten[1]} and {ten[2]} m. Yamanaka "
+        "and Ankersen's model equals HCW there."
     )
 
 
@@ -112,9 +114,9 @@ def _size_parts(errors: pd.DataFrame) -> str:
     sizes_m = bare.index.to_numpy(float)
     even_m = crossing(sizes_m, (bare / full).to_numpy(float), 0.5)
     return (
-        f"Without J2 only the linearisation is wrong, by {number(bare[1e3])} m at 1 km and {number(bare[1e4])} m at "
-        f"10 km over one orbit: with the square of the size. What J2 adds grows with the size itself; up to "
-        f"{number(even_m / 1e3)} km it is the greater part of HCW's error, beyond, the linearisation is."
+        f"Without J2 only the linearisation is in error, by {number(bare[1e3])} m at 1 km and {number(bare[1e4])} m at "
+        "10 km over one orbit: it grows with the square of the size. The contribution of J2 is proportional to the "
+        f"size; it dominates HCW's error up to {number(even_m / 1e3)} km, the linearisation beyond."
     )
 
 
@@ -125,50 +127,51 @@ def _tilt(errors: pd.DataFrame) -> str:
         return number(lines[mine & (lines["size_m"] == NEAR_M)]["error_m"].item())
 
     return (
-        f"What the mean reference is worth depends on the inclination: on an x-y ellipse of {NEAR_M:g} m modified HCW "
-        f"about the mean orbit errs by {error(97.8, MEAN)} m over one orbit at 97.8°, and by "
-        f"{error(97.8, OSCULATING)} m about the osculating one; at 0° by {error(0.0, MEAN)} and "
-        f"{error(0.0, OSCULATING)} m. A leader whose osculating elements are circular flies a slight ellipse under J2, "
-        f"which no circular model knows."
+        f"The benefit of the mean radius depends on the inclination: on an x-y ellipse of {NEAR_M:g} m modified HCW "
+        f"with the mean radius errs by {error(97.8, MEAN)} m over one orbit at 97.8°, and by "
+        f"{error(97.8, OSCULATING)} m with the osculating one; at 0° by {error(0.0, MEAN)} and "
+        f"{error(0.0, OSCULATING)} m. A leader whose osculating elements are circular follows a slight ellipse under "
+        "J2, which no circular model represents."
     )
 
 
 def _ellipse(errors: pd.DataFrame) -> str:
     small, large = (leader(eccentricity=e) for e in (0.001, 0.1))
     return (
-        f"An eccentricity of 0.001 takes HCW's {_near(errors, leader(), HCW)} m at {NEAR_M:g} m and one orbit to "
-        f"{_near(errors, small, HCW)} m, one of 0.1 to {_near(errors, large, HCW)} m; with Yamanaka and Ankersen's "
+        f"An eccentricity of 0.001 increases HCW's error at {NEAR_M:g} m over one orbit from "
+        f"{_near(errors, leader(), HCW)} m to {_near(errors, small, HCW)} m, one of 0.1 to "
+        f"{_near(errors, large, HCW)} m; with Yamanaka and Ankersen's "
         f"model it is {_near(errors, small, ELLIPTIC)} and {_near(errors, large, ELLIPTIC)} m, at 0.1 without J2 "
         f"{_near(errors, leader(eccentricity=0.1, j2=False), ELLIPTIC)} m."
     )
 
 
 def _feedback(costs: pd.DataFrame) -> str:
-    said = []
+    parts_by_policy = []
     for policy in ("lqr", "smc"):
-        more = costs[costs["policy"] == policy].set_index(["scenario", "world"])["more_percent"]
+        more = costs[costs["policy"] == policy].set_index(["scenario", "truth"])["more_percent"]
         parts = [
             f"{comparison.scenario} {number(more[comparison.scenario, closed_loop_costs.OSCULATING])} % "
             f"({number(more[comparison.scenario, closed_loop_costs.MEAN])} %)"
             for comparison in closed_loop_costs.COMPARISONS
             if comparison.scenario != closed_loop_costs.ECCENTRIC
         ]
-        said.append(f"{policy} {', '.join(parts)}")
+        parts_by_policy.append(f"{policy} {', '.join(parts)}")
     return (
-        f"In closed loop, with the gains tuned in the linear world, the nonlinear one costs more by, with the "
-        f"osculating reference (with the mean one): {'; '.join(said)}."
+        "In closed loop, with settings tuned on the linear truth, the nonlinear truth increases the cost by, with "
+        f"the osculating mean motion (with the mean one): {'; '.join(parts_by_policy)}."
     )
 
 
-def _believed(costs: pd.DataFrame) -> str:
+def _mismatched(costs: pd.DataFrame) -> str:
     lines = costs[(costs["scenario"] == closed_loop_costs.ECCENTRIC) & costs["policy"].isin(["lqr", "smc"])]
-    cost = lines.set_index(["policy", "world"])["cost_m_s"]
+    cost = lines.set_index(["policy", "truth"])["cost_m_s"]
     parts = []
     for policy in ("lqr", "smc"):
         right, wrong = (cost[policy, world] for world in (closed_loop_costs.ELLIPTIC, closed_loop_costs.CIRCULAR))
         more = 100 * (right / cost[policy, closed_loop_costs.LINEAR] - 1)
-        parts.append(f"{policy} {number(more)} % more than in the linear world, and {number(wrong / right)} times that")
+        parts.append(f"{policy} {number(more)} % more than on the linear truth, and {number(wrong / right)} times that")
     return (
-        f"On an ellipse of e = 0.1 the nonlinear world costs with Yamanaka and Ankersen's model in filter and law, and "
-        f"with HCW in both: {'; '.join(parts)}."
+        "With e = 0.1 the nonlinear truth costs, with Yamanaka and Ankersen's model in filter and law, and with "
+        f"HCW in both: {'; '.join(parts)}."
     )

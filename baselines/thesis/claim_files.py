@@ -1,4 +1,4 @@
-"""The claims as files."""
+"""Files of the claims."""
 
 import json
 from collections.abc import Sequence
@@ -10,11 +10,11 @@ from baselines.thesis.claims.claim import Claim
 
 
 def to_csv(claims: Sequence[Claim]) -> str:
-    """One line per claim; the columns are its fields, empty where there is no interval."""
+    """CSV with one line per claim; columns are its fields, empty without an interval."""
     columns = [field.name for field in fields(Claim)]
     return pd.DataFrame([asdict(claim) for claim in claims], columns=columns).to_csv(index=False)
 
 
 def to_json(claims: Sequence[Claim]) -> str:
-    """The same as a list of objects, null where there is no interval."""
+    """JSON list of the claims; null without an interval."""
     return json.dumps([asdict(claim) for claim in claims], indent=2, ensure_ascii=False, allow_nan=False) + "\n"

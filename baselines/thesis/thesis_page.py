@@ -1,7 +1,6 @@
 """The HTML page of the reproduction: one file that needs no network."""
 
 import base64
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
@@ -16,13 +15,13 @@ from baselines.thesis.claims.claim import Claim, Verdict
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure as it stands on the page.
+    """A figure of the page.
 
     Attributes:
-        number: of the figure in the thesis, or one of its own, M.1 and so on; empty if it has none.
+        number: of the figure in the thesis, or M.1, M.2, ... for figures of this project; empty if it has none.
         title: what it shows.
         sentence: of the thesis, beside the figure; empty if there is none.
-        note: what came out.
+        note: the outcome.
         svg: the figure.
     """
 
@@ -44,8 +43,8 @@ class Picture:
 
 
 @dataclass(frozen=True)
-class Table:
-    """A table as it stands on the page.
+class PageTable:
+    """A table of the page.
 
     Attributes:
         name: of its file.
@@ -61,12 +60,12 @@ class Table:
 
     @property
     def rows(self) -> list[list[str]]:
-        """Its lines in words."""
-        return [[_words(value) for value in line] for line in self.data.itertuples(index=False)]
+        """Its cells as text."""
+        return [[_text(value) for value in line] for line in self.data.itertuples(index=False)]
 
 
-def _words(value: Any) -> str:
-    """A cell: numbers to three digits, yes and no, nothing for what is missing."""
+def _text(value: Any) -> str:
+    """Text of a cell: numbers to three digits, yes or no, empty if missing."""
     if isinstance(value, (bool, np.bool_)):
         return "yes" if value else "no"
     if isinstance(value, (int, float, np.number)):
@@ -76,44 +75,56 @@ def _words(value: Any) -> str:
 
 @dataclass(frozen=True)
 class Content:
-    """What stands on the page; a section without content is left out.
+    """Contents of the page; a section without content is left out.
 
     Attributes:
         pictures: figures of the thesis, in order.
         claims: lines of the claims table.
-        tables: what stands below the claims.
-        model_errors: figures of what the linear world hides.
-        lessons: sentences above them.
-        guide: which model is good enough; stands below the sentences.
+        tables: tables below the claims.
+        model_errors: figures of what the linear models neglect.
+        model_sentences: sentences above them.
+        guide: table of the models' ranges of validity, below the sentences.
     """
 
     pictures: Sequence[Picture]
     claims: Sequence[Claim] = ()
-    tables: Sequence[Table] = ()
+    tables: Sequence[PageTable] = ()
     model_errors: Sequence[Picture] = ()
-    lessons: Sequence[str] = ()
-    guide: Table | None = None
+    model_sentences: Sequence[str] = ()
+    guide: PageTable | None = None
+
+
+def verdict_summary(claims: Sequence[Claim]) -> list[tuple[str, list[int]]]:
+    """Number of claims per verdict: one line per section of the thesis in order, then the total."""
+    lines = {"all": [claim.verdict for claim in claims]}
+    lines = {section: [c.verdict for c in claims if c.section == section] for section in _sections(claims)} | lines
+    return [(name, [verdicts.count(verdict) for verdict in get_args(Verdict)]) for name, verdicts in lines.items()]
+
+
+def _sections(claims: Sequence[Claim]) -> list[str]:
+    """Sections of the thesis that have claims, in order."""
+    return sorted({claim.section for claim in claims})
 
 
 def render(content: Content, facts: dict[str, Any]) -> str:
-    """The page.
+    """Render the page.
 
     Args:
-        content: what stands on it.
-        facts: what is said of the making: `command`, `episodes`, `step_s`, `versions`.
+        content: its sections.
+        facts: of this run: `command`, `episodes`, `step_s`, `step_warning` (empty if there is none), `versions`.
     """
     loader = jinja2.ChoiceLoader([jinja2.PackageLoader("baselines.thesis"), jinja2.PackageLoader("baselines.report")])
     environment = jinja2.Environment(
         loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    counts = Counter(claim.verdict for claim in content.claims)
     return environment.get_template("thesis.html.jinja").render(
         pictures=content.pictures,
         claims=content.claims,
         tables=content.tables,
         model_errors=content.model_errors,
-        lessons=content.lessons,
+        model_sentences=content.model_sentences,
         guide=content.guide,
-        verdicts=[(verdict, counts[verdict]) for verdict in get_args(Verdict)],
+        verdicts=get_args(Verdict),
+        summary=verdict_summary(content.claims),
         facts=facts,
     )
