@@ -97,7 +97,8 @@ class _Log:
         self._print(f"{self._title}: {share:.0%} after {_clock(elapsed)}{left}{text}")
 
     def _print(self, line: str) -> None:
-        print(line, file=self._file, flush=True)
+        self._file.write(f"{line}\n")  # in one piece: an interrupt does not split it
+        self._file.flush()
 
 
 def _clock(seconds: float) -> str:

@@ -539,5 +539,5 @@ def test_the_results_page_has_every_policy_and_environment(folder: Path) -> None
         assert len({line.count("|") for line in block}) == 1
         assert block[0] == f"| policy | {' | '.join(titles)} |"
     assert all(any(f"`{name}`" in line for line in blocks[0]) for name in POLICIES)
-    results = costing({"lqr": [1.0, 2.0]})
-    assert "| `lqr` | 1.5 [" in results_page([results])
+    results = costing({"lqr": [1.49, 1.5, 1.51]})
+    assert "| `lqr` | 1.500 [" in results_page([results])
