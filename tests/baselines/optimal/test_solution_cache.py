@@ -1,4 +1,4 @@
-"""What is kept of the fuel optimum, and what is made of it: nothing stale or broken passes."""
+"""Cached solutions of the perfect-information bound: nothing stale or broken passes; cost ratios."""
 
 import dataclasses
 from pathlib import Path
@@ -8,6 +8,7 @@ import pytest
 
 import baselines.optimal.lower_bound
 from baselines import OptimalPlan, cost_ratio, fuel_optimal
+from baselines.optimal import solution_cache
 from baselines.optimal.certificate import least_of_steps
 from formation_env import load_scenario
 from formation_env.task.scenario import Scenario
@@ -66,21 +67,25 @@ def test_a_bad_file_is_solved_anew(scenario: Scenario, tmp_path: Path, fault: st
     plan = fuel_optimal(scenario, seed=1, cache_folder=tmp_path)
     (file,) = tmp_path.iterdir()
     whole = file.read_bytes()
-    with np.load(file) as arrays:
-        controls, multipliers = arrays["controls"], arrays["multipliers"]
+    place = solution_cache.solution_entry(tmp_path, scenario, 1, None, False)
+    assert place.path == file
+    arrays = place.read()
+    assert arrays is not None
+    controls, multipliers = arrays["controls"], arrays["multipliers"]
     if fault in ("empty", "text", "cut"):
         file.write_bytes({"empty": b"", "text": b"no plan", "cut": whole[: len(whole) // 2]}[fault])
     elif fault == "keys":
-        np.savez(file, controls=controls)
+        place.write({"controls": controls})
     elif fault == "shape":
-        np.savez(file, controls=controls[1:], multipliers=multipliers)
+        place.write({"controls": controls[1:], "multipliers": multipliers})
     elif fault == "nan":
-        np.savez(file, controls=np.nan * controls, multipliers=multipliers)
+        place.write({"controls": np.nan * controls, "multipliers": multipliers})
     else:
-        np.savez(file, controls=0.9 * controls, multipliers=multipliers)
+        place.write({"controls": 0.9 * controls, "multipliers": multipliers})
     assert same(fuel_optimal(scenario, seed=1, cache_folder=tmp_path), plan)
-    with np.load(file) as arrays:
-        np.testing.assert_array_equal(arrays["controls"], controls)
+    mended = place.read()
+    assert mended is not None
+    np.testing.assert_array_equal(mended["controls"], controls)
     assert list(tmp_path.iterdir()) == [file]
 
 
