@@ -146,7 +146,7 @@ def test_killed_it_goes_on(tmp_path: Path) -> None:
     """SIGKILL in the second round leaves whole files, which another process finds under the same names and uses."""
     env, out = tmp_path / "short.yaml", tmp_path / "out"
     env.write_text(json.dumps(SHORT))
-    arguments = ["--env", env, "--policy", "lqr", "--out", out, "--episodes", 2, "--sweep-episodes", 2]
+    arguments = [env, "--policy", "lqr", "--out", out, "--episodes", 2, "--sweep-episodes", 2]
     arguments += ["--bound-episodes", 0, "--resume", "--processes", 1]
     with started("-m", "baselines", "report", *arguments):
         wait_until(lambda: len(list(out.glob(f"{FOLDER}/point_*{SUFFIX}"))) >= 2)
