@@ -148,7 +148,7 @@ PICTURES = (
     "agents.results.curve",
 )
 """Modules that plot, and those of the thesis whose names say so."""
-WITHOUT_PICTURES = ("formation_env.rendering", "formation_env.rendering.modes")
+WITHOUT_PICTURES = ("formation_env.rendering", "formation_env.rendering.modes", "formation_env.rendering.moment")
 
 
 def draws(module: str) -> bool:

@@ -103,7 +103,7 @@ def test_the_best_of_all_may_have_flown_fewer_seeds() -> None:
     """It is held against the policy on these alone."""
     text = cells(flown(KEEPING, "keeping", COSTS), CARD)["over best classical"]
     assert text.endswith(" (mpc, 4 of 30 seeds)")
-    assert ratio_of(text)[0] == pytest.approx(COSTS["ppo"][:4].mean() / COSTS["mpc"].mean(), abs=6e-4)
+    assert ratio_of(text)[0] == pytest.approx(COSTS["ppo"][:4].mean() / COSTS["mpc"].mean(), abs=6e-3)
 
 
 def test_a_policy_over_itself_is_one() -> None:
