@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 import numpy as np
 import pandas as pd
 
-from formation_env.dynamics import NONLINEAR
+from formation_env.dynamics import NONLINEAR, get_dynamics
 from formation_env.dynamics.propagation import propagate
 from formation_env.dynamics.spacecraft import Spacecraft
 from formation_env.formations import Following, Formation, InTrack, ProjectedCircle, SpaceCircle, XYEllipse
@@ -95,7 +95,10 @@ def prediction_errors(orbit: Orbit, states: Array) -> dict[str, Array]:
     errors: dict[str, Array] = {}
     for name, model in MODELS.items():
         if model.mean_motion_from == "osculating" or orbit.eccentricity == 0:
-            modelled = replace(orbit, mean_motion_from=model.mean_motion_from)
+            # a circular model takes an eccentric leader's orbit for the circle of equal period: its error is the point
+            circular = get_dynamics(model.dynamics).time_invariant
+            eccentricity = 0.0 if circular else orbit.eccentricity
+            modelled = replace(orbit, mean_motion_from=model.mean_motion_from, eccentricity=eccentricity)
             path = propagate(states, times_s, dynamics=model.dynamics, orbit=modelled, spacecraft=_NO_AIR)
             error_m: Array = np.linalg.norm((path - truth)[..., :3], axis=-1)
             errors[name] = np.stack([error_m[:, : span * INSTANTS + 1].max(axis=1) for span in SPANS], axis=1)
