@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 
 import typer
 
-from agents.cli_results import add_result_commands
+from agents.cli_results import AllowPickle, ThrottlePower, add_result_commands, warn_of_pickle
 from baselines.cli_report import ReportArguments, write_report_page
 from formation_env.cli_errors import DISTRIBUTION, INTERRUPTED, on_interrupt
 from formation_env.cli_group import Group, add_command, command_line, make_app
@@ -19,7 +19,7 @@ from formation_env.files import check_writable
 NAME = "agents"
 PROGRAM = f"{DISTRIBUTION} {NAME}"
 
-Algorithm = Annotated[str, typer.Argument(help="ppo or sac.", show_default=False)]
+Algorithm = Annotated[str, typer.Argument(help="Algorithm: ppo or sac.", show_default=False)]
 Config = Annotated[Path | None, typer.Option(help="YAML file of hyperparameters.", show_default="configs/agents")]
 Steps = Annotated[int | None, typer.Option(min=1, help="Environment steps.", show_default="from --config")]
 Rows = Annotated[int | None, typer.Option(min=1, help="Parallel environments.", show_default="from --config")]
@@ -48,9 +48,9 @@ app = make_app("Reinforcement learning: train policies, plot their curves, evalu
 @app.command(
     epilog=f"Example: {PROGRAM} train ppo FormationKeeping-v0 --out runs/mine; continue: --out runs/mine --resume"
 )
-def train(
+def train(  # longer than 40 lines: each option has its line
     context: typer.Context,
-    algorithm: Annotated[str | None, typer.Argument(help="ppo or sac.", show_default=False)] = None,
+    algorithm: Annotated[str | None, typer.Argument(help="Algorithm: ppo or sac.", show_default=False)] = None,
     env: Annotated[
         str | None, typer.Argument(help="Registered id, scenario name or YAML file.", show_default=False)
     ] = None,
@@ -191,6 +191,8 @@ class LearnedReportArguments(ReportArguments):
         list[str] | None,
         typer.Option(help="LABEL=PATH of a learned policy; may be repeated", show_default="the shipped policies"),
     ] = None
+    allow_pickle: AllowPickle = False
+    throttle_power: ThrottlePower = None
 
 
 def report(arguments: LearnedReportArguments) -> None:
@@ -199,14 +201,20 @@ def report(arguments: LearnedReportArguments) -> None:
     def write() -> Path:
         from agents.results.report import report_models
 
+        models = arguments.model or []
+        for model in models if arguments.allow_pickle else ():
+            if model.endswith(".zip"):
+                warn_of_pickle(model)
         return report_models(
-            arguments.model or [],
+            models,
             arguments.envs,
             arguments.options(),
             arguments.out,
             command_line(NAME),
             arguments.processes,
             arguments.policy or (),
+            allow_pickle=arguments.allow_pickle,
+            throttle_power=arguments.throttle_power,
         )
 
     write_report_page(arguments.out, arguments.resume, write)

@@ -11,6 +11,11 @@ from formation_env.files import check_writable, is_checkout
 
 PROGRAM = f"{DISTRIBUTION} agents"
 Bounds = Annotated[Path, typer.Option(file_okay=False, help="Folder of the cached bounds.")]
+AllowPickle = Annotated[bool, typer.Option("--allow-pickle", help="Load a .zip, which can run any code.")]
+ThrottlePower = Annotated[
+    float | None,
+    typer.Option(min=0.01, help="p where a .zip's actions z mean thrusts sign(z)|z|^p", show_default="1"),
+]
 Runs = Annotated[list[Path], typer.Argument(help="Folders of training runs.")]
 BOUNDS = Path("reports/bounds")
 """The report caches its bounds in the same folder."""
@@ -32,21 +37,23 @@ def evaluate(
         int, typer.Option(min=0, max=MAX_EPISODES, help="Seeds for which the bound is solved; 0 disables it.")
     ] = 20,
     bounds: Bounds = BOUNDS,
-    allow_pickle: Annotated[bool, typer.Option("--allow-pickle", help="Load a .zip, which can run any code.")] = False,
-    throttle_power: Annotated[
-        float | None,
-        typer.Option(min=0.01, help="p where a .zip's actions z mean thrusts sign(z)|z|^p", show_default="1"),
-    ] = None,
+    allow_pickle: AllowPickle = False,
+    throttle_power: ThrottlePower = None,
 ) -> None:
     """Evaluate a policy on the test episodes: mean and 95 % interval of each metric, and cost over the bound."""
     from agents.results.evaluate import choose, score
 
     if allow_pickle and source.suffix == ".zip":
-        typer.echo(f"warning: {source}: its pickled objects are executed", err=True)
+        warn_of_pickle(str(source))
     policy, scenario = choose(source, env, allow_pickle, throttle_power)
     if getattr(policy, "scenario", scenario) != scenario:
         typer.echo(f"note: {source} was trained on another scenario than {env}", err=True)
     typer.echo(score(policy, scenario, episodes, bound_episodes, bounds).to_string(float_format="{:.4g}".format))
+
+
+def warn_of_pickle(source: str) -> None:
+    """Say on stderr that a file's code is run."""
+    typer.echo(f"warning: {source}: its pickled objects are executed", err=True)
 
 
 def export(

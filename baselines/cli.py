@@ -78,13 +78,13 @@ def sweep(
     def write() -> Path:
         from baselines.controllers.registry import reference_policies, slow_policies
         from baselines.experiments.policy_factories import classical
-        from baselines.report.write_sweep import Wanted, write_sweep
+        from baselines.report.write_sweep import SweepOptions, write_sweep
         from formation_env.task.loading import ENV_IDS
 
         flown = envs or list(ENV_IDS)
         left_out = (*slow_policies(), *reference_policies())
         names = policy or [name for name in classical() if name not in left_out]
-        options = Wanted(episodes=episodes, bound_episodes=bound_episodes, resume=resume)
+        options = SweepOptions(episodes=episodes, bound_episodes=bound_episodes, resume=resume)
         return write_sweep(classical(names, flown), flown, options, out, command_line(NAME), processes)
 
     write_report_page(out, resume, write)

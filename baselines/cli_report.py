@@ -12,7 +12,7 @@ from formation_env.cli_options import MAX_EPISODES, PROCESSES, Envs, Episodes, O
 from formation_env.files import check_writable
 
 if TYPE_CHECKING:
-    from baselines.report import Wanted
+    from baselines.report import ReportOptions
 
 SlowEpisodes = Annotated[
     int, typer.Option(min=1, max=MAX_EPISODES, help="Episodes flown by slow policies (mpc): the first N.")
@@ -42,11 +42,11 @@ class ReportArguments:
     out: Out = Path("reports")
     processes: Processes = PROCESSES
 
-    def options(self) -> "Wanted":
+    def options(self) -> "ReportOptions":
         """How much the report flies."""
-        from baselines.report import Wanted
+        from baselines.report import ReportOptions
 
-        return Wanted(
+        return ReportOptions(
             episodes=self.episodes,
             slow_episodes=self.slow_episodes,
             sweep_episodes=self.sweep_episodes,

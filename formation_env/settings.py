@@ -191,10 +191,10 @@ def build(cls: type[T], data: Any, where: str) -> T:
 
 def _one_line_per_fault(error: pydantic.ValidationError, where: str) -> ConfigError:
     """The error of a file or class, a line per fault, at most MAX_FAULT_LINES of them."""
-    found = error.errors(include_url=False)
-    lines = [_describe(fault) for fault in found[:MAX_FAULT_LINES]]
-    if len(found) > MAX_FAULT_LINES:
-        lines.append(f"and {len(found) - MAX_FAULT_LINES} more faults")
+    faults = error.errors(include_url=False)
+    lines = [_describe(fault) for fault in faults[:MAX_FAULT_LINES]]
+    if len(faults) > MAX_FAULT_LINES:
+        lines.append(f"and {len(faults) - MAX_FAULT_LINES} more faults")
     return ConfigError("\n".join(f"{where}: {line}" for line in lines))
 
 

@@ -40,7 +40,7 @@ LAYERS = {
         {"", "__main__", "cli", "cli_env", "cli_errors", "cli_group", "cli_options"},
     ),
     "baselines": (
-        {"design"},
+        {"design", "result_cache"},
         {"optimal"},
         {"controllers"},
         {"experiments"},

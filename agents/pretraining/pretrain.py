@@ -116,7 +116,7 @@ def check_pretraining(settings: Pretraining, scenario: Scenario, seed: int) -> N
     """
     try:
         _training_seeds(settings, seed)
-    except ValueError:
+    except ConfigError:
         raise ConfigError(f"seed: no training seeds are left for pretraining, got {seed}") from None
     if settings.updates:
         for variant in draw_variants(scenario):
@@ -210,7 +210,7 @@ def _training_seeds(settings: Pretraining, seed: int) -> range:
     """Seeds of imitation and, after them, of the recorded episodes; different for each seed of a run.
 
     Raises:
-        ValueError: there are not so many.
+        ConfigError: there are not so many.
     """
     count = settings.training_episodes
     return seeds("training", _FIRST_SEED + (seed + 1) * count)[-count:]

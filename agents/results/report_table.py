@@ -1,4 +1,4 @@
-"""The report's table of learned policies: what they cost, what they took, and how they stand to the classical ones."""
+"""The report's table of learned policies: cost, training effort, and comparison with the classical policies."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Final
@@ -8,44 +8,43 @@ import numpy as np
 from agents.policy.library import Card, Interval
 from baselines.controllers.registry import POLICIES
 from baselines.experiments.statistics import Results
-from baselines.report.table import Table
-from baselines.report.words import duration, numbers
+from baselines.report.table import Cell, Quantity, Table
 
 LINEAR: Final = ("lqr", "lqr_finite", "lqr_quasi_static", "smc")
 """The LQR and sliding-mode policies that solve no cone program."""
-YARDSTICK: Final = "mpc"
-"""Whose time for an action stands beside the learned policies'."""
-NONE: Final = "–"
+MPC: Final = "mpc"
+"""Policy whose time per action stands beside the learned policies'."""
 COLUMNS: Final = (
     "environment",
     "policy",
     "cost, m/s",
-    "over training seeds, m/s",
+    "mean over training seeds, m/s",
     "training seeds",
-    "steps of each",
-    "wall time of each, min",
-    "learnt after pretraining, m/s",
+    "steps per run",
+    "pretraining per run, min",
+    "RL per run, min",
+    "gain from RL, m/s",
     "cost over bound",
     "over best LQR or SMC",
     "over best classical",
-    "an action takes",
-    f"{YARDSTICK}'s takes",
+    "time per action, µs",
+    f"time per action of {MPC}, µs",
 )
 NOTE: Final = (
-    "In brackets 95 % intervals. Cost: of the shipped policy, which validation seeds chose among its training runs, on "
-    "the test seeds of this report. Over training seeds: mean test cost of all its training runs, with Student's "
-    "interval over them. Wall time: mean of the runs, pretraining + reinforcement learning. Learnt after pretraining: "
-    "by how much reinforcement learning lowered the test cost of the actor that it started from, paired by seed. Over "
-    "bound: seed by seed, as in the tables below. Over a classical policy: ratio of the mean costs on the seeds of "
-    f"both, its interval paired by seed; the best is that of least mean cost, of {', '.join(LINEAR)}, or of all."
+    "In brackets 95 % intervals. Cost: of the shipped policy, chosen among its training runs on the validation seeds, "
+    "on the test seeds of this report. Mean over training seeds: mean test cost of all its training runs, with "
+    "Student's interval over them. Gain from RL: how much reinforcement learning lowered the test cost of the "
+    "pretrained actor, paired by seed. Over bound: mean of each seed's cost over its bound. Over a classical policy: "
+    "ratio of the mean costs on the seeds of both, with an interval paired by seed; the best one has the lowest mean "
+    f"cost, of {', '.join(LINEAR)}, or of all."
 )
 
 
 def learned_table(results: Sequence[Results], cards: Mapping[str, Sequence[Card]]) -> Table:
-    """A line for each environment and learned policy that has a card.
+    """A row for each environment and learned policy that has a card.
 
     Args:
-        results: what was flown.
+        results: of the environments.
         cards: label of a learned policy -> its cards, one for each scenario.
     """
     rows = [
@@ -58,49 +57,51 @@ def learned_table(results: Sequence[Results], cards: Mapping[str, Sequence[Card]
     return Table("learned", "Learned policies: cost, training and compute", COLUMNS, tuple(rows), NOTE)
 
 
-def _row(results: Results, label: str, card: Card) -> tuple[str, ...]:
+def _row(results: Results, label: str, card: Card) -> tuple[Cell, ...]:
+    ratio = results.cost_ratios_flown.get(label)
     return (
         results.flown.label,
         label,
-        _text(results.cost(label)),
-        _interval(card.cost_over_runs_m_s),
-        str(len(card.runs)),
-        f"{np.mean([run.steps for run in card.runs]):,.0f}",
-        _minutes(card),
-        _interval(card.runs[0].saved_m_s),
-        _text(results.cost_ratios[label]) if results.cost_ratios else NONE,
+        Quantity(results.cost_flown(label), results.count(label)),
+        _quantity(card.cost_over_runs_m_s, len(card.runs)),
+        len(card.runs),
+        round(float(np.mean([run.steps for run in card.runs]))),
+        _pretraining_min(card),
+        _minutes([run.wall_time_s for run in card.runs]),
+        _quantity(card.runs[0].saved_m_s, card.test_episodes),
+        None if ratio is None else Quantity(ratio, results.count(label)),
         _over(results, label, LINEAR),
         _over(results, label, POLICIES),
-        _time(results, label),
-        _time(results, YARDSTICK),
+        _time_us(results, label),
+        _time_us(results, MPC),
     )
 
 
-def _text(interval: tuple[float, float, float]) -> str:
-    mean, low, high = numbers(interval)
-    return mean if low == high else f"{mean} [{low}, {high}]"
+def _quantity(interval: Interval | None, count: int) -> Quantity | None:
+    return None if interval is None else Quantity((interval.mean, interval.low, interval.high), count)
 
 
-def _interval(found: Interval | None) -> str:
-    return NONE if found is None else _text((found.mean, found.low, found.high))
-
-
-def _minutes(card: Card) -> str:
-    """Of pretraining, a question mark where it is not known, and of what came then."""
+def _pretraining_min(card: Card) -> float | None:
+    """Mean pretraining time, minutes; None if a run does not know it."""
     times = [run.pretraining_s for run in card.runs if run.pretraining_s is not None]
-    before = f"{np.mean(times) / 60:.1f}" if len(times) == len(card.runs) else "?"
-    return f"{before} + {np.mean([run.wall_time_s for run in card.runs]) / 60:.1f}"
+    return _minutes(times) if len(times) == len(card.runs) else None
 
 
-def _over(results: Results, label: str, others: Iterable[str]) -> str:
-    """Cost over that of the best of some classical policies, and which that is."""
+def _minutes(times_s: Sequence[float]) -> float:
+    return round(float(np.mean(times_s)) / 60, 1)
+
+
+def _over(results: Results, label: str, others: Iterable[str]) -> Quantity | None:
+    """Cost over that of the best of some classical policies, and the name of that policy."""
     known = set(others)
     best = next((name for name in results.ranking if name in known), None)
     if best is None or not results.cost(best)[0] > 0:
-        return NONE
-    seeds = f", {results.count(best)} of {results.count(label)} seeds" if best in results.partial else ""
-    return f"{_text(results.over(label, best))} ({best}{seeds})"
+        return None
+    common = results.common(label, best)
+    seeds = f", {common} of {results.count(label)} seeds" if best in results.partial else ""
+    return Quantity(results.over(label, best), common, f"{best}{seeds}")
 
 
-def _time(results: Results, policy: str) -> str:
-    return duration(results.flown.action_time_us(policy)) if policy in results.flown.flights else NONE
+def _time_us(results: Results, policy: str) -> float | None:
+    """Median time per action with two significant digits, microseconds."""
+    return float(f"{results.flown.action_time_us(policy):.2g}") if policy in results.flown.flights else None

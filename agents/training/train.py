@@ -45,7 +45,7 @@ def training_seeds(seed: int, rows: int) -> range:
     """
     try:
         return seeds("training", (seed + 1) * rows)[-rows:]
-    except ValueError:
+    except ConfigError:
         raise ConfigError(f"seed: no training seeds are left for {rows} rows, got {seed}") from None
 
 
@@ -66,7 +66,7 @@ def check_run(run: Run) -> None:
     training_seeds(run.seed, run.agent.rows)
     try:
         seeds("validation", run.validation_episodes)
-    except ValueError as error:
+    except ConfigError as error:
         raise ConfigError(f"validation_episodes: {error}") from None
     if run.agent.pretraining is not None and not run.start:
         check_pretraining(run.agent.pretraining, run.scenario, run.seed)

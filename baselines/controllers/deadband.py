@@ -40,7 +40,7 @@ class Deadband(AccelerationPolicy):
     Settings = DeadbandSettings
     settings: DeadbandSettings
     search_space = (Parameter(("least_thrust",), 1e-3, 0.5, transfer=True), *CORRECTION, *STATION_KEEPING)
-    color, symbol, dash = "#8C6D1F", "pentagon", "dash"
+    color, symbol, dash = "#9A7B2C", "pentagon", "dash"
 
     def __init__(self, scenario: Scenario, settings: DeadbandSettings) -> None:
         super().__init__(scenario, settings)

@@ -29,7 +29,7 @@ class LQRFinite(LQR):
     name = "lqr_finite"
     Settings = LQRFiniteSettings
     search_space = REGULATOR
-    color, symbol, dash = "#7B6FD0", "diamond", "dot"
+    color, symbol, dash = "#8E7CC3", "diamond", "dot"
 
     def __init__(self, scenario: Scenario, settings: LQRFiniteSettings) -> None:
         transfer = TransferSettings(horizon="finite", weights=settings.transfer, rounds=0)

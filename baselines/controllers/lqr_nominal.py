@@ -41,7 +41,7 @@ class LQRNominal(AccelerationPolicy):
     search_space = REWEIGHTED_LQG
     library = SOLVER
     proportional = True
-    color, symbol, dash = "#332288", "hexagram", "dashdot"
+    color, symbol, dash = "#6C5CE7", "hexagram", "dashdot"
 
     def __init__(self, scenario: Scenario, settings: LQRNominalSettings) -> None:
         """Plan, and find the gains.

@@ -45,7 +45,7 @@ class LQRQuasiStatic(AccelerationPolicy):
     settings: LQRQuasiStaticSettings
     search_space = REGULATOR
     proportional = True
-    color, symbol, dash = "#56B4E9", "square", "dash"
+    color, symbol, dash = "#3D9BD1", "square", "dash"
 
     def __init__(self, scenario: Scenario, settings: LQRQuasiStaticSettings) -> None:
         super().__init__(scenario, settings)

@@ -40,7 +40,7 @@ class MPC(AccelerationPolicy):
     )
     library = SOLVER
     slow = True
-    color, symbol = "#AA3377", "star"
+    color, symbol = "#C2408A", "star"
 
     def __init__(self, scenario: Scenario, settings: MPCSettings) -> None:
         super().__init__(scenario, settings)

@@ -1,4 +1,4 @@
-"""What was possible at all on each seed, for the report to hold the policies against."""
+"""Perfect-information bound of each seed, as jobs for `experiments.parallel`."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,26 +11,29 @@ import numpy as np
 from baselines.experiments.parallel import Progress
 from baselines.optimal import fuel_optimal
 from baselines.optimal.cone_solver import SOLVER
+from baselines.result_cache import remove_temporaries
 from formation_env.dynamics import NONLINEAR
 from formation_env.numerics.arrays import Array
 from formation_env.task.scenario import Scenario
 
 FOLDER: Final = "bounds"
-"""Where the plans are kept, inside the report's folder."""
+"""Folder of the cached plans, inside the report's folder."""
+LABEL: Final = "perfect-information bound"
+"""Stands for a policy in the names of jobs."""
 _CHUNK: Final = 10
 """Seeds of one job."""
 _SOLVE_COST: Final = 2
-"""Time of one seed's solution, per step of the episode, in steps of a batch."""
+"""Time to solve one seed, per step of the episode, in steps of a batch."""
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """The least costs of some seeds; a `Work` of `baselines.experiments.parallel`.
+    """Perfect-information bounds of some seeds; a `Job` of `baselines.experiments.parallel`.
 
     Attributes:
         scenario: the environment, with a linear truth.
         seeds: of its episodes.
-        folder: where plans are kept, so that a second report need not solve them again.
+        folder: cache of the plans, so that a second report does not solve them again.
     """
 
     scenario: Scenario
@@ -39,11 +42,11 @@ class Bounds:
 
     @property
     def cost(self) -> int:
-        """How long it takes, in steps of a batch."""
+        """Estimated duration, in steps of a batch."""
         return self.scenario.num_steps * _SOLVE_COST * len(self.seeds)
 
-    def fly(self, progress: Progress) -> Array:
-        """The least cost of each seed (seeds,), m/s."""
+    def run(self, progress: Progress) -> Array:
+        """The bound of each seed (seeds,), m/s."""
         costs = np.empty(len(self.seeds))
         for index, seed in enumerate(self.seeds):
             costs[index] = fuel_optimal(self.scenario, seed=seed, cache_folder=self.folder).cost
@@ -51,10 +54,12 @@ class Bounds:
         return costs
 
 
-def bound_jobs(scenarios: Mapping[str, Scenario], seeds: Sequence[int], out: Path) -> dict[tuple[str, int], Bounds]:
-    """What is solved, by environment and first seed.
+def bound_jobs(
+    scenarios: Mapping[str, Scenario], seeds: Sequence[int], out: Path
+) -> dict[tuple[str, str, int], Bounds]:
+    """Bound jobs, by environment and first seed.
 
-    There is none for a nonlinear truth, and none at all where the solver is not installed.
+    A nonlinear truth has no bound; without the solver there are no jobs.
 
     Args:
         scenarios: label -> environment.
@@ -65,6 +70,9 @@ def bound_jobs(scenarios: Mapping[str, Scenario], seeds: Sequence[int], out: Pat
     if find_spec(SOLVER) is None:
         return {}
     chunks = [tuple(seeds)[start : start + _CHUNK] for start in range(0, len(seeds), _CHUNK)]
+    remove_temporaries(out / FOLDER)
     return {
-        (env, chunk[0]): Bounds(scenario, chunk, out / FOLDER) for env, scenario in linear.items() for chunk in chunks
+        (env, LABEL, chunk[0]): Bounds(scenario, chunk, out / FOLDER)
+        for env, scenario in linear.items()
+        for chunk in chunks
     }

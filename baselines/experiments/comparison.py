@@ -1,4 +1,4 @@
-"""What the report is about: every policy flown on every environment with the same seeds."""
+"""Comparison of policies: every policy on every environment with the same seeds."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,16 +19,16 @@ Environment = str | Path | Scenario
 
 @dataclass(frozen=True)
 class Flown:
-    """One environment, flown.
+    """Episodes of all policies on one environment.
 
     Attributes:
         label: name of the environment in the report.
-        scenario: its settings.
+        scenario: the environment.
         episodes: policy -> table of `formation_env.evaluation.evaluate`; shorter tables have the first ones of the
             longest's seeds.
-        flight_seed: seed of the flights shown in full.
+        flight_seed: seed of the episode shown in full.
         flights: policy -> table of `formation_env.evaluation.record`, with the column `ACTION_TIME`.
-        settings: policy -> its own settings as plain data, where it tells them.
+        settings: policy -> its own settings as plain data, where it gives them.
     """
 
     label: str
@@ -39,7 +39,7 @@ class Flown:
     settings: dict[str, Any]
 
     def action_time_us(self, policy: str) -> float:
-        """Median time of one action in the flight that is shown, microseconds."""
+        """Median time per action in the episode shown in full, microseconds."""
         return float(self.flights[policy][ACTION_TIME].median())
 
 
@@ -63,20 +63,20 @@ def name_environments(envs: Sequence[Environment]) -> dict[str, Scenario]:
 
 
 def join_episodes(
-    jobs: Mapping[tuple[str, str, int], Episodes], found: Mapping[Any, pd.DataFrame | None]
+    jobs: Mapping[tuple[str, str, int], Episodes], results: Mapping[Any, pd.DataFrame | None]
 ) -> dict[str, dict[str, pd.DataFrame]]:
     """Environment -> policy -> its episodes, in the order of their seeds.
 
     Args:
-        jobs: what was flown.
-        found: their tables by the same names.
+        jobs: that were run.
+        results: their tables by the same names.
 
     Raises:
         ConfigError: an environment without any policy.
     """
     parts: dict[str, dict[str, list[pd.DataFrame]]] = {env: {} for env, _, _ in jobs}
     for env, policy, first in jobs:
-        table = found[env, policy, first]
+        table = results[env, policy, first]
         if table is not None:
             parts[env].setdefault(policy, []).append(table)
     for env, policies in parts.items():
@@ -91,11 +91,11 @@ def join_episodes(
 def flight_jobs(
     jobs: Mapping[tuple[str, str, int], Episodes], episodes: Mapping[str, Mapping[str, pd.DataFrame]]
 ) -> dict[tuple[str, str], Flight]:
-    """One flight of each policy on a typical seed of its environment, by environment and policy.
+    """One episode of each policy on a typical seed of its environment, by environment and policy.
 
     Args:
-        jobs: what was flown.
-        episodes: what came of it, see `join_episodes`.
+        jobs: that were run.
+        episodes: their results, see `join_episodes`.
     """
     seeds = {env: typical_seed(tables) for env, tables in episodes.items()}
     return {
@@ -106,33 +106,33 @@ def flight_jobs(
 
 
 def typical_seed(episodes: Mapping[str, pd.DataFrame]) -> int:
-    """A seed of the middle fifth of the best policy's returns: the one that lost nearest to the mean share of data."""
+    """A seed in the middle fifth of the best policy's returns, with the most typical share of lost measurements."""
     best = max(episodes.values(), key=lambda table: table["return"].mean()).sort_values("return")
     middle = best.iloc[2 * len(best) // 5 : 3 * len(best) // 5 + 1]
     far = (middle["measurements_lost"] - best["measurements_lost"].mean()).abs()
-    return int(middle["seed"].loc[far.idxmin()])
+    return int(middle["seed"].to_numpy()[far.to_numpy(float).argmin()])
 
 
 def join_flights(
     scenarios: Mapping[str, Scenario],
     episodes: Mapping[str, dict[str, pd.DataFrame]],
     jobs: Mapping[tuple[str, str], Flight],
-    found: Mapping[Any, pd.DataFrame],
+    results: Mapping[Any, pd.DataFrame],
 ) -> list[Flown]:
-    """All that is known of each environment.
+    """Join episodes, recorded flights and settings of each environment.
 
     Args:
         scenarios: by environment.
         episodes: by environment and policy.
-        jobs: the flights that were flown.
-        found: their tables by the same names.
+        jobs: the recorded episodes.
+        results: their tables by the same names.
     """
-    result = []
+    joined = []
     for env, scenario in scenarios.items():
         own = {policy: job for (place, policy), job in jobs.items() if place == env}
-        flights = {policy: found[env, policy] for policy in own}
-        told = {policy: describe(job.factory, scenario) for policy, job in own.items()}
-        settings = {policy: values for policy, values in told.items() if values is not None}
+        flights = {policy: results[env, policy] for policy in own}
+        described = {policy: describe(job.factory, scenario) for policy, job in own.items()}
+        settings = {policy: values for policy, values in described.items() if values is not None}
         seed = next(iter(own.values())).seed
-        result.append(Flown(env, scenario, episodes[env], seed, flights, settings))
-    return result
+        joined.append(Flown(env, scenario, episodes[env], seed, flights, settings))
+    return joined

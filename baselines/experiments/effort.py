@@ -1,23 +1,23 @@
-"""How much effort a report is worth."""
+"""Effort of a report: how many episodes and sweeps it flies."""
 
 from dataclasses import dataclass, field
 
 from baselines.controllers.registry import reference_policies, slow_policies
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """What to fly for a report.
+@dataclass(frozen=True, kw_only=True)
+class ReportOptions:
+    """Effort of a report.
 
     Attributes:
         episodes: test seeds of each environment.
-        slow_episodes: of these the first ones, for slow policies.
-        sweep_episodes: test seeds of each point of fronts and robustness; 0 leaves them out.
-        sweep_bound_episodes: of these, seeds of the bound's front.
-        coarse: whether a sweep has a few values of each quantity only.
-        resume: whether finished flights are kept, and those that were kept are not flown again.
+        slow_episodes: slow policies fly the first so many of them.
+        sweep_episodes: test seeds of each point of trade-off and robustness; 0 leaves both out.
+        sweep_bound_episodes: seeds, among them, for which the trade-off bound is solved; 0 disables it.
+        coarse: whether a sweep takes only a few values of each quantity.
+        resume: whether finished jobs are cached, and cached ones are not run again.
         slow: labels of the slow policies.
-        unswept: labels of the policies that fronts and robustness leave out.
+        unswept: labels of the policies without trade-off and robustness.
     """
 
     episodes: int = 100

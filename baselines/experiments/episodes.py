@@ -1,4 +1,4 @@
-"""The flights of a report as jobs for `experiments.parallel`: episodes in numbers, and one flight to look at."""
+"""Jobs of a report for `experiments.parallel`: metrics of many episodes, and one episode instant by instant."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -8,27 +8,27 @@ from typing import Any, Final
 import numpy as np
 import pandas as pd
 
-from baselines.experiments.parallel import Progress, Share
-from baselines.experiments.policy_factories import PolicyFactory, describe
+from baselines.experiments.parallel import Progress, ProgressShare
+from baselines.experiments.policy_factories import PolicyFactory, cache_key
 from formation_env.evaluation.rollout import Policy, evaluate, record
 from formation_env.task.scenario import Scenario
 
 CHUNK: Final = 5
-"""Episodes of a slow policy in one job; fast ones fly all of theirs side by side."""
+"""Episodes of a slow policy in one job; a fast policy flies all of its episodes in one batch."""
 SLOW_COST: Final = 40
-"""Time of one action of a slow policy, in steps of a batch."""
+"""Time per action of a slow policy, in steps of a batch."""
 ACTION_TIME: Final = "action_time_us"
-"""Column of a flight: the time of `predict` for the one observation before, microseconds."""
+"""Column of a flight: time of `predict` for the single observation before, microseconds."""
 
 
 @dataclass(frozen=True)
 class Episodes:
-    """Episodes of a policy, in numbers.
+    """Episodes of a policy, with their metrics.
 
     Attributes:
-        scenario: what is flown.
+        scenario: the environment.
         policy: label.
-        factory: makes it.
+        factory: makes the policy.
         seeds: one per episode.
         slow: whether the policy is slow.
     """
@@ -41,19 +41,19 @@ class Episodes:
 
     @property
     def cost(self) -> int:
-        """How long it takes, in steps of a batch."""
+        """Estimated duration, in steps of a batch."""
         return self.scenario.num_steps * (SLOW_COST * len(self.seeds) if self.slow else 1)
 
     @property
     def key(self) -> Any:
-        """All that the table depends on; None if the policy does not tell its settings."""
-        settings = describe(self.factory, self.scenario)
+        """Cache key (compared by repr); None, where the policy does not give its settings, disables caching."""
+        settings = cache_key(self.factory, self.scenario)
         return None if settings is None else (self.scenario, self.policy, settings, self.seeds)
 
-    def fly(self, progress: Progress) -> pd.DataFrame | None:
+    def run(self, progress: Progress) -> pd.DataFrame | None:
         """The table of `formation_env.evaluation.evaluate`; None if there is no policy for the scenario."""
         policy = self.factory(self.scenario, self.scenario)
-        share = Share(progress, self.cost, self.scenario.num_steps * len(self.seeds))
+        share = ProgressShare(progress, self.cost, self.scenario.num_steps * len(self.seeds))
         table = None if policy is None else evaluate(policy, self.scenario, self.seeds, share.advance)
         share.finish()
         return table
@@ -61,12 +61,12 @@ class Episodes:
 
 @dataclass(frozen=True)
 class Flight:
-    """One flight of a policy, instant by instant.
+    """One episode of a policy, instant by instant.
 
     Attributes:
-        scenario: what is flown.
+        scenario: the environment.
         policy: label.
-        factory: makes it.
+        factory: makes the policy.
         seed: of the episode.
         slow: whether the policy is slow.
     """
@@ -79,33 +79,33 @@ class Flight:
 
     @property
     def cost(self) -> int:
-        """How long it takes, in steps of a batch."""
+        """Estimated duration, in steps of a batch."""
         return self.scenario.num_steps * (SLOW_COST if self.slow else 1)
 
     @property
     def key(self) -> Any:
-        """All that the table depends on; None if the policy does not tell its settings."""
-        settings = describe(self.factory, self.scenario)
+        """Cache key (compared by repr); None, where the policy does not give its settings, disables caching."""
+        settings = cache_key(self.factory, self.scenario)
         return None if settings is None else (self.scenario, self.policy, settings, self.seed)
 
-    def fly(self, progress: Progress) -> pd.DataFrame:
+    def run(self, progress: Progress) -> pd.DataFrame:
         """The table of `formation_env.evaluation.record`, with the time of each action, `ACTION_TIME`."""
         policy = self.factory(self.scenario, self.scenario)
         assert policy is not None, "it has flown its episodes"
-        watched = Stopwatch(policy)
-        table = record(watched, self.scenario, self.seed)
-        table[ACTION_TIME] = [np.nan, *watched.times_us]
+        timed = Stopwatch(policy)
+        table = record(timed, self.scenario, self.seed)
+        table[ACTION_TIME] = [np.nan, *timed.times_us]
         progress(self.cost)
         return table
 
 
 @dataclass(frozen=True)
 class Stopwatch:
-    """A policy that is asked for one observation at a time, and how long each answer took.
+    """A policy that receives one observation at a time, and the time per action.
 
     Attributes:
         policy: the policy.
-        times_us: of the answers up to now, microseconds.
+        times_us: of the actions so far, microseconds.
     """
 
     policy: Policy
@@ -124,20 +124,20 @@ class Stopwatch:
 def episode_jobs(
     policies: Mapping[str, PolicyFactory], env: str, scenario: Scenario, seeds: Sequence[int], slow: Mapping[str, int]
 ) -> dict[tuple[str, str, int], Episodes]:
-    """What is flown in an environment, by environment, policy and first seed.
+    """Jobs of an environment, by environment, policy and first seed.
 
     Args:
         policies: label -> factory.
         env: name of the environment.
         scenario: its settings.
         seeds: one episode each.
-        slow: label of each slow policy -> how many of the seeds it flies.
+        slow: label of each slow policy -> number of seeds it flies.
     """
-    made = {}
+    jobs = {}
     for name, factory in policies.items():
         own = tuple(seeds)[: slow.get(name)]
         length = CHUNK if name in slow else len(own)
         for start in range(0, len(own), length):
             chunk = own[start : start + length]
-            made[env, name, chunk[0]] = Episodes(scenario, name, factory, chunk, name in slow)
-    return made
+            jobs[env, name, chunk[0]] = Episodes(scenario, name, factory, chunk, name in slow)
+    return jobs

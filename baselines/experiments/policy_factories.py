@@ -1,11 +1,13 @@
-"""Policies as data: made where they are flown, in other processes, too."""
+"""Policy factories: picklable, so that worker processes make their own policies."""
 
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, is_dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, Protocol
 
+from baselines import result_cache
 from baselines.controllers.policy import AccelerationPolicy
 from baselines.controllers.registry import (
     POLICIES,
@@ -23,16 +25,16 @@ from formation_env.task.scenario import Scenario
 class PolicyFactory(Protocol):
     """Makes a fresh policy. To fly in several processes it must be importable, so no lambda.
 
-    A factory may have a method `settings(original)` that gives all that its policy depends on, as a dataclass or as
-    plain data, or None if it has no policy. Then the report shows them, and its flights can be kept.
+    A factory may have a method `settings(original)` that returns all that its policy depends on, as a dataclass or as
+    plain data, or None if it has no policy. Then the report shows them, and its episodes can be cached.
     """
 
     def __call__(self, original: Scenario, believed: Scenario, /) -> Policy | None:
-        """A policy for the scenario that it is told of, or None if there is none.
+        """A policy designed for the believed scenario, or None if there is none.
 
         Args:
-            original: the scenario whose settings or training it has.
-            believed: the one it is told of; another than the original only where that is varied.
+            original: the scenario whose settings or training the policy has.
+            believed: the scenario it is designed for; it differs from the original only in a sweep.
         """
         ...
 
@@ -70,7 +72,7 @@ class Classical:
 
 
 def classical(names: Sequence[str] = (), environments: Sequence[str | Path] = ()) -> dict[str, Classical]:
-    """Factories of classical policies, each once.
+    """Factories of classical policies.
 
     Args:
         names: of the policies; by default all whose libraries are installed.
@@ -92,7 +94,24 @@ def _settings(name: str, path: Path) -> Any:
 
 
 def describe(factory: PolicyFactory, original: Scenario) -> Any:
-    """A factory's settings for a scenario as plain data; None if it does not tell them."""
-    tell = getattr(factory, "settings", None)
-    found = None if tell is None else tell(original)
+    """A factory's settings for a scenario as plain data; None if it does not give them."""
+    settings = getattr(factory, "settings", None)
+    found = None if settings is None else settings(original)
     return asdict(found) if is_dataclass(found) and not isinstance(found, type) else found
+
+
+def cache_key(factory: PolicyFactory, original: Scenario) -> Any:
+    """All that a factory's policy depends on: its settings and its code; None if it does not give its settings."""
+    settings = describe(factory, original)
+    module = getattr(factory, "__module__", type(factory).__module__)
+    return None if settings is None else (settings, _module_hash(module))
+
+
+@cache
+def _module_hash(module: str) -> str:
+    """Hash of the sources of a module's package, or of the module itself if it is in none."""
+    package = sys.modules.get(module.partition(".")[0])
+    if package is not None and getattr(package, "__path__", None):
+        return result_cache.hash_sources(path for root in package.__path__ for path in sorted(Path(root).rglob("*.py")))
+    file = getattr(sys.modules.get(module), "__file__", None)
+    return "" if file is None else result_cache.hash_sources([Path(file)])

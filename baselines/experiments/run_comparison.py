@@ -1,4 +1,4 @@
-"""All that a report flies, in two rounds: what the second flies depends on the first."""
+"""All episodes of a report, in two rounds: the second round depends on the results of the first."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ import pandas as pd
 
 from baselines.experiments import parallel
 from baselines.experiments.bound_jobs import Bounds, bound_jobs
+from baselines.experiments.cached_jobs import FOLDER, cached
 from baselines.experiments.comparison import Flown, flight_jobs, join_episodes, join_flights
-from baselines.experiments.effort import Wanted
-from baselines.experiments.episodes import episode_jobs
+from baselines.experiments.effort import ReportOptions
+from baselines.experiments.episodes import Episodes, episode_jobs
 from baselines.experiments.policy_factories import PolicyFactory
-from baselines.experiments.result_cache import FOLDER, keep
 from baselines.experiments.sweep import Point, Sweep, points
 from baselines.optimal.cone_solver import SOLVER
 from formation_env.evaluation.seeds import seeds
@@ -28,13 +28,13 @@ Policies = Mapping[str, PolicyFactory]
 
 
 @dataclass(frozen=True)
-class Found:
-    """What was flown.
+class ComparisonData:
+    """Raw results of a comparison.
 
     Attributes:
-        flown: the environments.
-        bounds: least cost of each seed (seeds,), m/s, by environment; those with a nonlinear truth have none.
-        sweep: fronts and robustness.
+        flown: the environments with their episodes.
+        bounds: perfect-information bound of each seed (seeds,), m/s, by environment; none for a nonlinear truth.
+        sweep: trade-off and robustness.
     """
 
     flown: list[Flown]
@@ -42,61 +42,63 @@ class Found:
     sweep: Sweep
 
 
-def fly(policies: Policies, scenarios: Scenarios, wanted: Wanted, out: Path, workers: int) -> Found:
+def run_comparison(
+    policies: Policies, scenarios: Scenarios, options: ReportOptions, out: Path, workers: int
+) -> ComparisonData:
     """Fly all policies on all environments, with a progress bar for each round.
 
     Args:
         policies: label -> factory.
         scenarios: label -> environment.
-        wanted: how much to fly.
+        options: effort.
         out: the report's folder.
         workers: processes.
 
     Raises:
         ConfigError: a faulty policy, or an environment without any.
         ValueError: no or too many episodes.
-        RuntimeError: the bound's solver failed.
+        RuntimeError: the bound's solver failed, or a worker process died.
         OSError: the folder cannot be written.
     """
-    folder, all_seeds = out / FOLDER if wanted.resume else None, seeds("test", wanted.episodes)
-    slow = dict.fromkeys(wanted.slow, wanted.slow_episodes)
-    flights = {}
+    folder, all_seeds = out / FOLDER if options.resume else None, seeds("test", options.episodes)
+    slow = dict.fromkeys(options.slow, options.slow_episodes)
+    flights: dict[tuple[str, str, int], Episodes] = {}
     for env, scenario in scenarios.items():
         flights |= episode_jobs(policies, env, scenario, all_seeds, slow)
-    solved = bound_jobs(scenarios, all_seeds, out)
-    first = parallel.fly({**keep(flights, folder), **solved}, workers)
+    bounds = bound_jobs(scenarios, all_seeds, out)
+    first = parallel.run_with_bar({**cached(flights, folder), **bounds}, workers, "episodes and bounds (1 of 2)")
     episodes = join_episodes(flights, first)
     shown = flight_jobs(flights, episodes)
-    crews = {env: _swept(policies, tables, wanted) for env, tables in episodes.items()}
-    varied, faults = _points(scenarios, crews, wanted)
-    second = parallel.fly({**keep(shown, folder), **keep(varied, folder)}, workers)
+    swept = {env: _swept(policies, tables, options) for env, tables in episodes.items()}
+    varied, faults = _points(scenarios, swept, options)
+    second = parallel.run_with_bar({**cached(shown, folder), **cached(varied, folder)}, workers, "sweeps (2 of 2)")
     sweep = Sweep.join([second[name] for name in varied], faults)
-    return Found(join_flights(scenarios, episodes, shown, second), _join_bounds(solved, first), sweep)
+    return ComparisonData(join_flights(scenarios, episodes, shown, second), _join_bounds(bounds, first), sweep)
 
 
-def _join_bounds(solved: Mapping[tuple[str, int], Bounds], found: Mapping[Any, Array]) -> dict[str, Array]:
+def _join_bounds(jobs: Mapping[tuple[str, str, int], Bounds], results: Mapping[Any, Array]) -> dict[str, Array]:
     parts: dict[str, list[Array]] = {}
-    for env, first in solved:
-        parts.setdefault(env, []).append(found[env, first])
+    for name in jobs:
+        parts.setdefault(name[0], []).append(results[name])
     return {env: np.concatenate(costs) for env, costs in parts.items()}
 
 
-def _swept(policies: Policies, flown: Mapping[str, pd.DataFrame], wanted: Wanted) -> dict[str, PolicyFactory]:
-    """The policies of an environment's fronts."""
-    return {name: policies[name] for name in flown if name not in wanted.unswept}
+def _swept(policies: Policies, tables: Mapping[str, pd.DataFrame], options: ReportOptions) -> dict[str, PolicyFactory]:
+    """The policies of an environment's sweep."""
+    return {name: policies[name] for name in tables if name not in options.unswept}
 
 
 def _points(
-    scenarios: Scenarios, crews: Mapping[str, Policies], wanted: Wanted
+    scenarios: Scenarios, swept: Mapping[str, Policies], options: ReportOptions
 ) -> tuple[dict[str, Point], dict[str, str]]:
-    """What fronts and robustness fly, and why an environment has none."""
-    made: dict[str, Point] = {}
+    """Jobs of trade-off and robustness, and the reason where an environment has none."""
+    jobs: dict[str, Point] = {}
     faults: dict[str, str] = {}
-    bound_episodes = wanted.sweep_bound_episodes if find_spec(SOLVER) else 0
-    for env, crew in crews.items() if wanted.sweep_episodes else ():
-        own = seeds("test", wanted.sweep_episodes)
+    bound_episodes = options.sweep_bound_episodes if find_spec(SOLVER) else 0
+    for env, policies in swept.items() if options.sweep_episodes else ():
+        own = seeds("test", options.sweep_episodes)
         try:
-            made |= points({env: scenarios[env]}, crew, own, bound_episodes, wanted.coarse) if crew else {}
+            jobs |= points({env: scenarios[env]}, policies, own, bound_episodes, options.coarse) if policies else {}
         except ConfigError as error:
             faults[env] = str(error)
-    return made, faults
+    return jobs, faults

@@ -1,4 +1,4 @@
-"""What is flown for a sweep, and what comes of it: one line per episode."""
+"""Sweeps over scenario variations: the jobs, and their episodes as one table."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,8 +7,9 @@ from typing import Any, Final, Self
 import numpy as np
 import pandas as pd
 
+from baselines.experiments.estimates import ratio_of_means
 from baselines.experiments.parallel import Progress
-from baselines.experiments.policy_factories import PolicyFactory, describe
+from baselines.experiments.policy_factories import PolicyFactory, cache_key
 from baselines.experiments.variations import FRONT, VARIATIONS
 from baselines.optimal import fuel_optimal
 from formation_env.dynamics import NONLINEAR
@@ -20,10 +21,18 @@ from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import build_schedule, column, columns
 
 BOUND: Final = "bound"
-"""Stands for a policy in the tables of the front."""
+"""Label of the perfect-information bound in the tables of the trade-off."""
 KEYS: Final = ["env", "quantity", "value", "policy"]
 METRICS: Final = ["cost_m_s", "delta_v_m_s", "position_error_mean_m"]
 COLUMNS: Final = [*KEYS, "seed", *METRICS, "ended_early"]
+ABOVE: Final = ["above_percent", "above_low_percent", "above_high_percent"]
+"""Cost above the reference policy's on the same seeds, and its interval."""
+SUMMARY_COLUMNS: Final = [
+    *(*KEYS, "episodes", "ended_early", *METRICS, "cost_low_m_s", "cost_high_m_s", "reference"),
+    *ABOVE,
+]
+REFERENCE: Final = "lqr"
+"""The policy that others are compared with; the first policy where it does not fly."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +42,12 @@ class Point:
     Attributes:
         env: name of the environment.
         places: quantities and their values that make it; the scenario's own value of several is one point.
-        flown: the scenario.
-        believed: the scenario that policies are told of.
-        original: the scenario that was varied; its gains are used throughout.
+        flown: the scenario that is simulated.
+        believed: the scenario that policies are designed for.
+        original: the scenario that was varied; policies have its settings throughout.
         policies: label -> factory.
         seeds: one per episode.
-        bound_seeds: those on which the bound is solved, too.
+        bound_seeds: those for which the bound is solved.
     """
 
     env: str
@@ -52,17 +61,17 @@ class Point:
 
     @property
     def cost(self) -> int:
-        """How long it takes, in steps."""
+        """Estimated duration, in steps of a batch."""
         return self.flown.num_steps * (len(self.policies) + len(self.bound_seeds))
 
     @property
     def key(self) -> Any:
-        """All that the table depends on; None if a policy does not tell its settings."""
-        told = {name: describe(factory, self.original) for name, factory in self.policies.items()}
+        """Cache key (compared by repr); None, where a policy does not give its settings, disables caching."""
+        settings = {name: cache_key(factory, self.original) for name, factory in self.policies.items()}
         place = (self.env, self.places, self.flown, self.believed)
-        return None if None in told.values() else (*place, told, self.seeds, self.bound_seeds)
+        return None if None in settings.values() else (*place, settings, self.seeds, self.bound_seeds)
 
-    def fly(self, progress: Progress) -> pd.DataFrame:
+    def run(self, progress: Progress) -> pd.DataFrame:
         """Fly it; progress is called with the cost of what was flown since the last call.
 
         Returns:
@@ -89,7 +98,8 @@ class Point:
             for quantity, value in self.places
             for table in (*tables, *(bounds if quantity == FRONT else ()))
         ]
-        return pd.concat(placed, ignore_index=True)[COLUMNS]
+        table: pd.DataFrame = pd.concat(placed, ignore_index=True)[COLUMNS]
+        return table
 
     def _fly(self, name: str, policy: Policy) -> pd.DataFrame:
         flown = evaluate(policy, self.flown, self.seeds)
@@ -122,7 +132,7 @@ def points(
     bound_episodes: int,
     coarse: bool = False,
 ) -> dict[str, Point]:
-    """All that a sweep flies, by name.
+    """Jobs of a sweep, by name.
 
     Args:
         scenarios: label -> environment.
@@ -130,31 +140,31 @@ def points(
         seeds: one per episode, the same everywhere.
         bound_episodes: how many of the seeds the bound is solved on, along the front; none where the truth is
             nonlinear.
-        coarse: a few values of each quantity only.
+        coarse: whether to take only a few values of each quantity.
 
     Raises:
-        ConfigError: a price of errors of 0, or a scenario that a variation does not fit.
+        ConfigError: an error weight of 0, or a scenario that a variation does not fit.
     """
-    made = {}
+    jobs = {}
     for env, scenario in scenarios.items():
         if scenario.reward.error_weight == 0:
-            raise ConfigError(f"sweep: {env}: reward.error_weight: must be > 0 for a front, got 0")
+            raise ConfigError(f"sweep: {env}: reward.error_weight: must be > 0 for a trade-off, got 0")
         solved = tuple(seeds)[:bound_episodes] if scenario.dynamics != NONLINEAR else ()
         places: dict[tuple[Scenario, Scenario], list[tuple[str, float]]] = {}
         for quantity, value, flown, believed in _varied(env, scenario, coarse):
             places.setdefault((flown, believed), []).append((quantity, value))
-        for (flown, believed), made_by in places.items():
-            made[f"{env} {made_by[0][0]} {made_by[0][1]:g}"] = Point(
+        for (flown, believed), own in places.items():
+            jobs[f"{env} {own[0][0]} {own[0][1]:g}"] = Point(
                 env=env,
-                places=tuple(made_by),
+                places=tuple(own),
                 flown=flown,
                 believed=believed,
                 original=scenario,
                 policies=policies,
                 seeds=tuple(seeds),
-                bound_seeds=solved if any(quantity == FRONT for quantity, _ in made_by) else (),
+                bound_seeds=solved if any(quantity == FRONT for quantity, _ in own) else (),
             )
-    return made
+    return jobs
 
 
 def _varied(env: str, scenario: Scenario, coarse: bool) -> Iterator[tuple[str, float, Scenario, Scenario]]:
@@ -169,12 +179,12 @@ def _varied(env: str, scenario: Scenario, coarse: bool) -> Iterator[tuple[str, f
 
 @dataclass(frozen=True)
 class Sweep:
-    """What came of a sweep.
+    """Results of a sweep.
 
     Attributes:
         episodes: one line per episode: `COLUMNS`.
         summary: see `summarise`.
-        faults: environment -> why it has none.
+        faults: environment -> why it has no sweep.
     """
 
     episodes: pd.DataFrame
@@ -192,12 +202,12 @@ class Sweep:
         return cls(episodes, summarise(episodes), faults)
 
     def of(self, env: str) -> Self:
-        """The share of one environment."""
-        own = (table[table["env"] == env] for table in (self.episodes, self.summary))
-        return type(self)(*own, {name: fault for name, fault in self.faults.items() if name == env})
+        """The part of one environment."""
+        episodes, summary = (table[table["env"] == env] for table in (self.episodes, self.summary))
+        return type(self)(episodes, summary, {name: fault for name, fault in self.faults.items() if name == env})
 
     def as_data(self) -> dict[str, Any]:
-        """Means, intervals and what was varied, as plain data."""
+        """Means, intervals and varied quantities as plain data."""
         return {
             "quantities": {
                 name: {"label": VARIATIONS[str(name)].label, "values": values.unique().tolist()}
@@ -209,14 +219,28 @@ class Sweep:
 
 
 def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
-    """Means of each point and policy, the cost's with its 95 % interval.
+    """Means of each point and policy, the cost's with its 95 % interval, and the paired difference to a reference.
 
     Returns:
-        One line each: `KEYS`, episodes, ended_early (how many), the means of `METRICS`, low and high of the cost.
+        One line each: `KEYS`, episodes, ended_early (how many), the means of `METRICS`, low and high of the cost, the
+        name of the reference policy, and by how many per cent the mean cost is above the reference's on the same seeds,
+        with its interval; NaN for the bound, which has fewer seeds.
     """
     lines = []
-    for key, group in episodes.groupby(KEYS, sort=False):
-        means = [float(group[metric].mean()) for metric in METRICS]
-        interval = bootstrap_interval(group["cost_m_s"].to_numpy(float))
-        lines.append((*key, len(group), int(group["ended_early"].sum()), *means, *interval))
-    return pd.DataFrame(lines, columns=[*KEYS, "episodes", "ended_early", *METRICS, "cost_low_m_s", "cost_high_m_s"])
+    for _, point in episodes.groupby(KEYS[:-1], sort=False):
+        costs = {str(name): own["cost_m_s"].to_numpy(float) for name, own in point.groupby("policy", sort=False)}
+        reference = REFERENCE if REFERENCE in costs else next(iter(costs))
+        for key, own in point.groupby(KEYS, sort=False):
+            means = [float(own[metric].mean()) for metric in METRICS]
+            interval = bootstrap_interval(own["cost_m_s"].to_numpy(float))
+            above = _above_percent(costs[str(key[-1])], costs[reference])
+            lines.append((*key, len(own), int(own["ended_early"].sum()), *means, *interval, reference, *above))
+    return pd.DataFrame(lines, columns=SUMMARY_COLUMNS)
+
+
+def _above_percent(costs: Array, reference: Array) -> tuple[float, float, float]:
+    """By how many per cent a mean cost is above the reference's, paired by seed, with its interval."""
+    if len(costs) != len(reference) or not reference.mean() > 0:
+        return np.nan, np.nan, np.nan
+    mean, low, high = (100 * (value - 1) for value in ratio_of_means(costs, reference))
+    return mean, low, high

@@ -1,4 +1,4 @@
-"""What is varied. To add a quantity: a function here, and a line in `VARIATIONS`."""
+"""Variations of a scenario. To add a quantity: a function here, and a line in `VARIATIONS`."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -9,7 +9,7 @@ from formation_env.dynamics import NONLINEAR
 from formation_env.task.scenario import Scenario
 
 Pair = tuple[Scenario, Scenario]
-"""The scenario that is flown, and the one that policies are made for."""
+"""The scenario that is simulated, and the one that policies are designed for."""
 
 
 @dataclass(frozen=True)
@@ -19,9 +19,9 @@ class Variation:
     Attributes:
         vary: makes the scenarios for one of its values, each from the same scenario.
         values: of the quantity, ascending.
-        label: what the axis says, with the unit.
+        label: title of the axis, with the unit.
         log: whether the axis is logarithmic.
-        names: what the axis says in place of values, where they are kinds.
+        names: tick labels in place of values, where the values are kinds.
     """
 
     vary: Callable[[Scenario, float], Pair]
@@ -38,9 +38,9 @@ class Variation:
 
 
 def error_weight(scenario: Scenario, factor: float) -> Pair:
-    """Price of the mean error, in units of the scenario's."""
+    """Error weight, in units of the scenario's."""
     weight = factor * scenario.reward.error_weight
-    return _told(replace(scenario, reward=replace(scenario.reward, error_weight=weight)))
+    return _same(replace(scenario, reward=replace(scenario.reward, error_weight=weight)))
 
 
 def outage_length(scenario: Scenario, mean_outage_s: float) -> Pair:
@@ -72,23 +72,24 @@ def _bursts(scenario: Scenario, mean_outage_s: float, share: float) -> Scenario:
 def sensor_noise(scenario: Scenario, factor: float) -> Pair:
     """The sensor's sigmas, in units of the scenario's."""
     known = scenario.sensor
-    sigmas = {"sigma_pos_m": factor * known.sigma_pos_m, "sigma_vel_m_s": factor * known.sigma_vel_m_s}
-    return _told(replace(scenario, sensor=replace(known, **sigmas)))
+    noisier = replace(known, sigma_pos_m=factor * known.sigma_pos_m, sigma_vel_m_s=factor * known.sigma_vel_m_s)
+    return _same(replace(scenario, sensor=noisier))
 
 
 def thrust_limit(scenario: Scenario, factor: float) -> Pair:
-    """Greatest thrust, in units of the scenario's."""
-    return _told(_with_thrust(scenario, factor))
+    """Thrust limit, in units of the scenario's."""
+    return _same(_with_thrust(scenario, factor))
 
 
 def initial_error(scenario: Scenario, factor: float) -> Pair:
     """Spread of the start, in units of the scenario's."""
     known = scenario.start
-    spread = {
-        "initial_sigma_pos_m": factor * known.initial_sigma_pos_m,
-        "initial_sigma_vel_m_s": factor * known.initial_sigma_vel_m_s,
-    }
-    return _told(replace(scenario, start=replace(known, **spread)))
+    wider = replace(
+        known,
+        initial_sigma_pos_m=factor * known.initial_sigma_pos_m,
+        initial_sigma_vel_m_s=factor * known.initial_sigma_vel_m_s,
+    )
+    return _same(replace(scenario, start=wider))
 
 
 def true_dynamics(scenario: Scenario, nonlinear: float) -> Pair:
@@ -97,7 +98,7 @@ def true_dynamics(scenario: Scenario, nonlinear: float) -> Pair:
 
 
 def ballistic_coefficient(scenario: Scenario, percent: float) -> Pair:
-    """The follower's ballistic coefficient m / (C_d S) off by so many per cent; leader and filter stay as they were."""
+    """The follower's ballistic coefficient m / (C_d S) off by by some per cent; leader and filter are unchanged."""
     known = scenario.spacecraft
     true = replace(known, area_m2=known.area_m2 / (1 + percent / 100))
     believed = replace(scenario.filter, spacecraft=scenario.filter_model.spacecraft)
@@ -105,7 +106,7 @@ def ballistic_coefficient(scenario: Scenario, percent: float) -> Pair:
 
 
 def thrust_magnitude(scenario: Scenario, percent: float) -> Pair:
-    """Thrust so many per cent above what the policy commands; the filter knows the thrust that acts."""
+    """Thrust some per cent above the command; the filter knows the thrust that acts."""
     return _with_thrust(scenario, 1 + percent / 100), scenario
 
 
@@ -114,15 +115,15 @@ def _with_thrust(scenario: Scenario, factor: float) -> Scenario:
     return replace(scenario, spacecraft=replace(scenario.spacecraft, max_accel_m_s2=limit))
 
 
-def _told(scenario: Scenario) -> Pair:
+def _same(scenario: Scenario) -> Pair:
     return scenario, scenario
 
 
 FRONT: Final = "error_weight"
-"""The quantity whose values make the front."""
+"""The quantity that is varied along the trade-off."""
 
 VARIATIONS: Final[dict[str, Variation]] = {
-    FRONT: Variation(error_weight, (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0), "price of error, × the scenario's", log=True),
+    FRONT: Variation(error_weight, (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0), "error weight, × the scenario's", log=True),
     "outage_length": Variation(outage_length, (60.0, 300.0, 600.0, 1200.0, 3000.0), "mean outage, s", log=True),
     "measurement_loss": Variation(measurement_loss, (0.02, 0.1, 0.3, 0.5, 0.7), "share of lost measurements"),
     "sensor_noise": Variation(sensor_noise, (0.1, 0.3, 1.0, 3.0, 10.0), "sensor noise, × the scenario's", log=True),
@@ -132,10 +133,10 @@ VARIATIONS: Final[dict[str, Variation]] = {
         true_dynamics, (0.0, 1.0), "true dynamics", names={0.0: "as the filter's", 1.0: "nonlinear"}
     ),
     "ballistic_coefficient": Variation(
-        ballistic_coefficient, (-50.0, 0.0, 50.0), "ballistic coefficient, % above the believed"
+        ballistic_coefficient, (-50.0, 0.0, 50.0), "ballistic coefficient, % above the design value"
     ),
     "thrust_magnitude": Variation(
-        thrust_magnitude, (-20.0, -10.0, 0.0, 10.0, 20.0), "thrust magnitude, % above the commanded"
+        thrust_magnitude, (-20.0, -10.0, 0.0, 10.0, 20.0), "thrust magnitude, % above the command"
     ),
 }
-"""Quantities by name, the front's first. Policies are told of price, noise, limit and start; the rest they bear."""
+"""Quantities by name, the trade-off's first. Policies are designed for error weight, noise, limit and start only."""

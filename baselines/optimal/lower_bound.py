@@ -74,13 +74,13 @@ def fuel_optimal(
     problem = episode_problem(scenario, seed, initial_state, exact_arrival)
     if cache_folder is None:
         return _solve(problem)[0]
-    path = solution_cache.path_of(cache_folder, scenario, seed, initial_state, exact_arrival)
-    cached = solution_cache.read(path, len(problem.Phi))
+    place = solution_cache.solution_entry(cache_folder, scenario, seed, initial_state, exact_arrival)
+    cached = solution_cache.read(place, len(problem.Phi))
     # A cached plan is certified on today's problem, so that nothing stale passes.
     if cached is not None and _is_optimal(plan := _certify(problem, cached)):
         return plan
     plan, solution = _solve(problem)
-    solution_cache.write(path, solution)
+    solution_cache.write(place, solution)
     return plan
 
 

@@ -1,4 +1,4 @@
-"""Pictures of one flight per policy over time: error, thrust, delta-v, with outages and phases."""
+"""Figures of one episode per policy over time: error, thrust, delta-v, with outages and phases."""
 
 from collections.abc import Iterable
 
@@ -13,7 +13,9 @@ from baselines.report.score_figures import Looks
 from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import legs
 
-ROWS = ("error, m", "thrust, mm/s²", "Δv so far, m/s")
+ROWS = ("error, m", "thrust, mm/s²", "cumulative Δv, m/s")
+THRUST_FLOOR = 1e-4
+"""Thrust below this share of the limit is drawn as none: a solver leaves 1e-10 where it means zero."""
 _THRUST = ["ax_m_s2", "ay_m_s2", "az_m_s2"]
 
 
@@ -21,6 +23,7 @@ def time_figure(results: Results, looks: Looks) -> go.Figure:
     """Position error, thrust and accumulated delta-v over time, outages shaded, phases marked."""
     scenario, flights = results.flown.scenario, results.flown.flights
     period_s = scenario.orbit.period_s
+    limit_mm_s2 = 1e3 * scenario.spacecraft.max_accel_m_s2
     heights = [0.44, 0.28, 0.28]
     figure = make_subplots(rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.035, row_heights=heights)
     for name in results.ranking:
@@ -29,6 +32,7 @@ def time_figure(results: Results, looks: Looks) -> go.Figure:
         time = (shown["time_s"] / period_s).to_numpy(np.float32)
         total = flight["delta_v_m_s"].cumsum().loc[shown.index]
         thrust = 1e3 * np.linalg.norm(flight[_THRUST].shift(-1).ffill().loc[shown.index].to_numpy(), axis=1)
+        thrust = np.where(thrust < THRUST_FLOOR * limit_mm_s2, np.nan, thrust)
         for row, values in enumerate((shown["position_error_m"].to_numpy(), thrust, total.to_numpy()), start=1):
             trace = _line(time, values, name, looks, first=row == 1, stepped=row == 2)
             trace.update(visible="legendonly" if name in results.hidden else True)
@@ -38,6 +42,8 @@ def time_figure(results: Results, looks: Looks) -> go.Figure:
     for row, title in enumerate(ROWS, start=1):
         figure.update_yaxes(style.axis(title, log=row < 3), row=row, col=1)
     figure.update_yaxes(rangemode="tozero", row=3, col=1)
+    ends = np.log10(np.array([THRUST_FLOOR, 2.0]) * limit_mm_s2)  # three axes together reach sqrt(3) times the limit
+    figure.update_yaxes(range=ends.tolist(), row=2, col=1)
     end = scenario.num_steps * scenario.dt_s / period_s
     figure.update_xaxes(gridcolor=style.GRID, zeroline=False, range=[0, end])
     figure.update_xaxes(title={"text": f"time, orbits of {period_s / 60:.1f} min"}, row=3, col=1)
@@ -46,7 +52,7 @@ def time_figure(results: Results, looks: Looks) -> go.Figure:
 
 
 def _line(time: np.ndarray, values: np.ndarray, name: str, looks: Looks, first: bool, stepped: bool) -> go.Scatter:
-    """One quantity of one flight; the thrust holds from an instant on."""
+    """One quantity of one episode; thrust is constant over a step."""
     look = looks[name]
     line = {"color": look.color, "dash": look.dash, "width": 1.2 if stepped else 1.8}
     line["shape"] = "hv" if stepped else "linear"
@@ -65,7 +71,7 @@ def _mark(figure: go.Figure, scenario: Scenario, flights: Iterable[pd.DataFrame]
     tolerance = {"type": "line", "xref": "x domain", "x0": 0, "x1": 1, "y0": scenario.tolerance_m, "yref": "y"}
     figure.add_shape(**tolerance, y1=scenario.tolerance_m, line=width | {"dash": "dot"}, name="tolerance")
     figure.layout.shapes[-1].showlegend = True
-    for start, end, text in stages(scenario):
+    for start, end, text in phases(scenario):
         label = {"text": text, "showarrow": False, "xref": "x", "yref": "paper", "y": 1.0, "yanchor": "bottom"}
         figure.add_annotation(**label, x=(start + end) / 2, font={"size": 12})
         if start > 0:
@@ -73,8 +79,8 @@ def _mark(figure: go.Figure, scenario: Scenario, flights: Iterable[pd.DataFrame]
             figure.add_shape(**place, line=width | {"dash": "dash"})
 
 
-def stages(scenario: Scenario) -> list[tuple[float, float, str]]:
-    """Transfers and holds: start and end in orbits, and what is done."""
+def phases(scenario: Scenario) -> list[tuple[float, float, str]]:
+    """Transfers and holds: start and end in orbits, and a name."""
     result = []
     unit = scenario.dt_s / scenario.orbit.period_s
     for leg in legs(scenario):

@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 import formation_env
-from baselines.experiments.effort import Wanted
-from baselines.experiments.statistics import Interval, Results
+from baselines.experiments.effort import ReportOptions
+from baselines.experiments.estimates import MIN_VERDICT_EPISODES, Interval
+from baselines.experiments.statistics import Results
 from baselines.experiments.sweep import Sweep
 from baselines.report.table import Table
 from formation_env.evaluation.seeds import seeds
@@ -30,7 +31,7 @@ LIBRARIES = (
     "stable-baselines3",
     "torch",
 )
-"""Their versions are noted, where they are installed."""
+"""Libraries whose versions are recorded, where they are installed."""
 
 
 def versions() -> dict[str, str]:
@@ -45,19 +46,20 @@ def versions() -> dict[str, str]:
 
 
 def document(
-    results: list[Results], sweep: Sweep, wanted: Wanted, command: str, tables: Sequence[Table]
+    results: list[Results], sweep: Sweep, options: ReportOptions, command: str, tables: Sequence[Table]
 ) -> dict[str, Any]:
-    """All that is needed to redo and to judge the report, as plain data."""
+    """The report as plain data: all that is needed to repeat it and to check its numbers."""
     return {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": command,
         "versions": versions(),
-        "seeds": list(seeds("test", wanted.episodes)),
-        "wanted": asdict(wanted),
-        "means": "over all seeds; of policies with fewer episodes the reference's plus the paired difference to it",
+        "seeds": list(seeds("test", options.episodes)),
+        "options": asdict(options),
+        "means": "over all seeds; where estimated, the reference's mean plus the paired difference to it",
+        "verdicts": f"significant: null below {MIN_VERDICT_EPISODES} common episodes",
         "intervals": "bootstrap, 95 %, of the mean",
         "environments": {item.flown.label: _environment(item) for item in results},
-        "tables": [asdict(table) for table in tables],
+        "tables": [table.as_data() for table in tables],
         "sweep": sweep.as_data(),
     }
 
@@ -69,6 +71,7 @@ def _environment(results: Results) -> dict[str, Any]:
         "num_steps": flown.scenario.num_steps,
         "flight_seed": flown.flight_seed,
         "ranking": results.ranking,
+        "best": results.best,
         "reference": results.reference,
         "bounds": results.bounds,
         "policies": {name: _policy(results, name) for name in flown.episodes},
@@ -80,25 +83,29 @@ def _policy(results: Results, name: str) -> dict[str, Any]:
     return {
         "settings": results.flown.settings.get(name),
         "episodes": results.count(name),
+        "estimated": name in results.partial,
         "ended_early": results.ended_early(name),
         "action_time_us": results.flown.action_time_us(name),
         "cost_m_s": _interval(results.cost(name)),
-        "cost_ratio": _interval(results.cost_ratios[name]) if name in results.cost_ratios else None,
+        "cost_on_seeds_flown_m_s": _interval(results.cost_flown(name)),
+        "cost_ratio": _interval(results.cost_ratios.get(name)),
+        "cost_ratio_on_seeds_flown": _interval(results.cost_ratios_flown.get(name)),
         "summary": {str(metric): _interval(results.interval(name, str(metric))) for metric in summary.index},
         "paired_differences": {
             reference: {metric: _interval(values) for metric, values in differences[name].items()}
+            | {"n": results.common(name, reference), "significant": results.verdict(name, reference)}
             for reference, differences in results.differences.items()
             if name != reference
         },
     }
 
 
-def _interval(interval: Interval) -> dict[str, float]:
-    return dict(zip(("mean", "low", "high"), interval, strict=True))
+def _interval(interval: Interval | None) -> dict[str, float] | None:
+    return None if interval is None else dict(zip(("mean", "low", "high"), interval, strict=True))
 
 
 def to_json(data: dict[str, Any]) -> str:
-    """Strict JSON: what is not a number becomes null, arrays become lists."""
+    """Strict JSON: NaN and infinities become null, arrays become lists."""
     return json.dumps(_plain(data), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 

@@ -1,28 +1,31 @@
-"""The HTML page: one file that needs no network."""
+"""The report's HTML page: one file that needs no network."""
 
+from collections.abc import Sequence
 from typing import Any
 
-from baselines.experiments.statistics import Results, significant
+from baselines.experiments.statistics import Results
 from baselines.experiments.sweep import Sweep
 from baselines.report import html
-from baselines.report.flight_figures import time_figure
+from baselines.report.environment_tables import main_table, metrics_table, seeds_flown_table
+from baselines.report.flight_figures import THRUST_FLOOR, time_figure
 from baselines.report.scene_figure import scene_figure
 from baselines.report.score_figures import Looks, cost_figure, trade_figure
 from baselines.report.sweep_figures import looks_of
 from baselines.report.sweep_section import section
-from baselines.report.words import duration, fewer, headline, number, numbers, reading
-from formation_env.kernel.metrics import METRICS
+from baselines.report.table import Table
+from baselines.report.text import column, fewer, headline, number, reading
 
 
-def render(results: list[Results], sweep: Sweep, data: dict[str, Any]) -> str:
+def render(results: list[Results], sweep: Sweep, data: dict[str, Any], tables: Sequence[Table] = ()) -> str:
     """The page of all environments: one file that needs no network.
 
     Args:
-        results: what to show.
-        sweep: fronts and robustness.
+        results: to show.
+        sweep: trade-off and robustness.
         data: the report as data (`baselines.report.json_document`).
+        tables: further tables.
     """
-    policies = list(dict.fromkeys(name for item in results for name in item.flown.episodes))
+    policies = list(dict.fromkeys(name for item in results for name in item.ranking))
     looks = looks_of(policies)
     return html.render(
         "page.html.jinja",
@@ -30,24 +33,38 @@ def render(results: list[Results], sweep: Sweep, data: dict[str, Any]) -> str:
             "data": data,
             "policies": policies,
             "colors": {name: look.color for name, look in looks.items()},
-            "overview": [_overview(item, policies) for item in results],
+            "opening": _opening(results[0], looks),
+            "overview": _overview(results, policies),
+            "tables": [{"title": each.title, "columns": each.columns, "rows": each.texts()} for each in tables],
+            "notes": [each.note for each in tables],
             "sections": [_section(index, item, sweep, looks, data) for index, item in enumerate(results)],
         },
     )
 
 
-def _overview(results: Results, policies: list[str]) -> dict[str, Any]:
-    """A line of the first table: mean cost of each policy on one environment."""
-    costs = {name: numbers(results.cost(name))[0] for name in results.flown.episodes}
-    bound = "–" if results.bounds is None else number(float(results.bounds.mean()))
-    line = {"label": results.flown.label, "best": results.best, "bound": bound}
-    return line | {"costs": [(name, costs.get(name)) for name in policies]}
+def _opening(results: Results, looks: Looks) -> dict[str, Any]:
+    """The best policy's recorded episode in space, as the first figure of the page."""
+    figure = scene_figure(results, looks, [results.best])
+    figure.update_layout(height=420)
+    return {"label": results.flown.label, "policy": results.best, "figure": html.div(figure, "opening")}
+
+
+def _overview(results: Sequence[Results], policies: Sequence[str]) -> dict[str, Any]:
+    """The first table: mean cost of each policy (rows) on each environment (columns)."""
+    cells: dict[str, list[dict[str, Any] | None]] = {name: [] for name in policies}
+    for item in results:
+        own = [name for name in policies if name in item.flown.episodes]
+        shown = dict(zip(own, column([item.cost(name) for name in own]), strict=True))
+        for name, row in cells.items():
+            cell = shown.get(name)
+            row.append(cell and {"text": cell[0], "best": name == item.best, "estimate": name in item.partial})
+    bounds = [None if item.bounds is None else number(float(item.bounds.mean())) for item in results]
+    return {"labels": [item.flown.label for item in results], "bounds": bounds, "rows": cells}
 
 
 def _section(index: int, results: Results, sweep: Sweep, looks: Looks, data: dict[str, Any]) -> dict[str, Any]:
-    """All that the template shows of one environment."""
+    """Template variables of one environment."""
     flown = results.flown
-    details = data["environments"][flown.label]
     figures = {
         "cost": cost_figure(results, looks),
         "trade": trade_figure(results, looks),
@@ -62,18 +79,20 @@ def _section(index: int, results: Results, sweep: Sweep, looks: Looks, data: dic
         "headline": headline(results),
         "reading": reading(results),
         "fewer": fewer(results),
-        "columns": _columns(),
-        "rows": [_row(results, name) for name in results.ranking],
+        "table": main_table(results),
+        "metrics": metrics_table(results),
+        "seeds_flown": seeds_flown_table(results),
         "versus": results.best,
         "bound": None if results.bounds is None else number(float(results.bounds.mean())),
         "figures": {key: html.div(figure, f"{key}-{index}") for key, figure in figures.items()},
         "zero_thrust": any((table["delta_v_m_s"] <= 0).any() for table in flown.episodes.values()),
+        "thrust_floor_percent": 100 * THRUST_FLOOR,
         "hidden": results.hidden,
         "flight_seed": flown.flight_seed,
-        "flights": [_flight(results, name) for name in results.ranking],
+        "flights": _flights(results),
         "tolerance_m": flown.scenario.tolerance_m,
         "weight": flown.scenario.reward.error_weight,
-        "details": details,
+        "details": data["environments"][flown.label],
         "sweep": section(index, flown.scenario, sweep.of(flown.label), looks),
         "unswept": sweep.faults.get(flown.label),
     }
@@ -93,46 +112,13 @@ def _facts(results: Results) -> list[str]:
     ]
 
 
-def _columns() -> list[tuple[str, str, str]]:
-    """Metric, heading and unit of each column."""
-    return [(name, metric.heading, metric.unit) for name, metric in METRICS.items() if name != "steps"]
-
-
-def _row(results: Results, name: str) -> dict[str, Any]:
-    """A policy's line of the table."""
-    cells = []
-    for metric, _, _ in _columns():
-        factor = METRICS[metric].factor
-        mean, *ends = numbers(results.interval(name, metric), factor)
-        low, high = ends if factor > 0 else ends[::-1]
-        best = name in results.best_of(metric)
-        cells.append({"mean": mean, "low": low, "high": high, "best": best})
-    ratio = numbers(results.cost_ratios[name]) if results.cost_ratios else None
-    return {
-        "policy": name,
-        "best": name == results.best,
-        "cells": cells,
-        "versus": _versus(results, name),
-        "episodes": results.count(name),
-        "action_time": duration(results.flown.action_time_us(name)),
-        "cost_ratio": ratio and dict(zip(("mean", "low", "high"), ratio, strict=True)),
-    }
-
-
-def _versus(results: Results, name: str) -> dict[str, Any] | None:
-    """The paired difference of the cost to the best policy's."""
-    if name == results.best:
-        return None
-    difference = results.behind(results.best, name)
-    mean, low, high = numbers(difference)
-    return {"mean": mean, "low": low, "high": high, "significant": significant(difference)}
-
-
-def _flight(results: Results, name: str) -> dict[str, str]:
-    """What the flight shown in full came to."""
-    flight = results.flown.flights[name]
-    return {
-        "policy": name,
-        "delta_v": number(float(flight["delta_v_m_s"].sum())),
-        "final": number(float(flight["position_error_m"].iloc[-1])),
-    }
+def _flights(results: Results) -> list[dict[str, str]]:
+    """Delta-v and final error of the recorded episodes."""
+    flights = [results.flown.flights[name] for name in results.ranking]
+    totals = [float(flight["delta_v_m_s"].sum()) for flight in flights]
+    errors = [float(flight["position_error_m"].iloc[-1]) for flight in flights]
+    columns = [[cell[0] for cell in column([(x, x, x) for x in values]) if cell] for values in (totals, errors)]
+    return [
+        {"policy": name, "delta_v": dv, "final": error}
+        for name, dv, error in zip(results.ranking, *columns, strict=True)
+    ]

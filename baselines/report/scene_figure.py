@@ -1,4 +1,6 @@
-"""The flights of all policies in space, in the leader's frame."""
+"""The recorded episodes in space, in the leader's frame."""
+
+from collections.abc import Sequence
 
 import numpy as np
 import plotly.graph_objects as go
@@ -16,14 +18,20 @@ _LEAST_SIDE = 0.3
 _POSITION = ["x_m", "y_m", "z_m"]
 
 
-def scene_figure(results: Results, looks: Looks) -> go.Figure:
-    """True paths, reference paths, leader, starts and arrivals; one scale for all three axes."""
+def scene_figure(results: Results, looks: Looks, policies: Sequence[str] = ()) -> go.Figure:
+    """True paths, reference paths, leader, starts and arrivals; one scale for all three axes.
+
+    Args:
+        results: of the environment.
+        looks: of the policies.
+        policies: to draw; by default all.
+    """
     flown = results.flown
     figure = go.Figure()
     for trace in _plan(flown.scenario):
         figure.add_trace(trace)
     visible = [_corners(flown.scenario)]
-    for name in results.ranking:
+    for name in policies or results.ranking:
         flight = flown.flights[name]
         path = 1e-3 * flight[_POSITION].to_numpy()[style.thinned(len(flight))]
         trace = _curve(path, name, {"color": looks[name].color, "width": 4})
@@ -85,13 +93,19 @@ def _box(points: np.ndarray) -> np.ndarray:
 
 
 def _unseen(corners: np.ndarray) -> go.Scatter3d:
-    """Points that only make the axes hold them."""
+    """Invisible points that extend the axes."""
     return _points(corners, "", "circle", 1).update(opacity=0, showlegend=False, hoverinfo="skip", hovertemplate=None)
 
 
 def _scene(sides: np.ndarray) -> dict[str, object]:
     """Three labelled axes of equal scale, seen from far enough to hold a box of the given sides (3,), km."""
-    common = {"gridcolor": style.GRID, "zerolinecolor": style.NEUTRAL, "showbackground": False, "color": style.NEUTRAL}
+    common = {
+        "gridcolor": style.GRID,
+        "zerolinecolor": style.NEUTRAL,
+        "showbackground": False,
+        "nticks": 5,
+        "color": style.NEUTRAL,
+    }
     axes = {f"{name}axis": common | {"title": {"text": title}} for name, title in AXES.items()}
     longest = sides.max() / np.cbrt(sides.prod())  # plotly scales the box to unit volume
     x, y, z = (1.3 + 0.72 * longest) * np.array([0.62, -0.67, 0.41])

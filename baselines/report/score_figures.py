@@ -1,4 +1,4 @@
-"""Pictures of all episodes: the cost of each, and thrust against error."""
+"""Figures of all episodes: the cost of each, and thrust against error."""
 
 import math
 from collections.abc import Iterable
@@ -8,11 +8,12 @@ import numpy as np
 import pandas as pd
 import plotly.graph_objects as go
 
-from baselines.experiments.statistics import Interval, Results
+from baselines.experiments.estimates import Interval
+from baselines.experiments.statistics import Results
 from baselines.report import style
 from baselines.report.scales import Scale, round_values, view_buttons, without_zeros
 from baselines.report.style import Look
-from baselines.report.words import number
+from baselines.report.text import number
 from formation_env.task.reward import Reward
 
 Looks = dict[str, Look]
@@ -31,7 +32,7 @@ def cost_figure(results: Results, looks: Looks) -> go.Figure:
         figure.add_trace(_dots(costs[name][dots], row + _spread(len(dots)), looks[name]))
         seeds = results.flown.episodes[name]["seed"].to_numpy()[dots]
         figure.data[-1].update(customdata=seeds, hovertemplate="%{x:.4g} m/s, seed %{customdata}", name=name)
-        figure.add_trace(_mean_bar(results.cost(name), row, name))
+        figure.add_trace(_mean_bar(results.cost_flown(name), row, name))
     figure.update_xaxes(style.axis("cost = −return: Δv + weighted mean error, m/s"))
     figure.update_yaxes(style.axis(""), tickvals=list(range(len(rows))), ticktext=rows)
     scales = _views([costs[name] for name in rows], [costs[name] for name in rows if name not in results.hidden])
@@ -90,9 +91,9 @@ def trade_figure(results: Results, looks: Looks) -> go.Figure:
         custom = tables[name][["delta_v_m_s", "position_error_mean_m", "seed"]].to_numpy()[shown]
         hover = "Δv %{customdata[0]:.4g} m/s, error %{customdata[1]:.4g} m, seed %{customdata[2]}"
         figure.data[-1].update(customdata=custom, hovertemplate=hover, name=name, legendgroup=name, showlegend=False)
-        means = results.mean(name, "delta_v_m_s"), results.mean(name, "position_error_mean_m")
-        shown_at = (mean or float(placed[name].mean()) for mean, placed in zip(means, (x, y), strict=True))
-        figure.add_trace(_mean_dot(*shown_at, looks[name], name))
+        means = [float(tables[name][metric].mean()) for metric in ("delta_v_m_s", "position_error_mean_m")]
+        place_x, place_y = (mean or float(on[name].mean()) for mean, on in zip(means, (x, y), strict=True))
+        figure.add_trace(_mean_dot(place_x, place_y, looks[name], name))
         figure.data[-1].update(hovertemplate=f"mean: Δv {number(means[0])} m/s, error {number(means[1])} m")
     figure.update_layout(legend={"orientation": "h", "x": 0, "y": -0.2, "yanchor": "top"})
     figure.update_xaxes(style.axis("Δv, m/s"))
@@ -102,7 +103,7 @@ def trade_figure(results: Results, looks: Looks) -> go.Figure:
 
 
 def _placed(results: Results, metric: str) -> dict[str, np.ndarray]:
-    """Where the episodes of each policy stand on an axis."""
+    """Coordinates of the episodes of each policy on an axis."""
     values = pd.concat({name: table[metric] for name, table in results.flown.episodes.items()})
     placed = pd.Series(without_zeros(values.to_numpy(float)), values.index)
     return {name: placed.loc[name].to_numpy() for name in results.flown.episodes}

@@ -1,4 +1,4 @@
-"""Colours, symbols and axes that all pictures share."""
+"""Colours, symbols and axes that all figures share."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ GRID: Final = "rgba(128, 134, 144, 0.25)"
 SHADE: Final = "rgba(128, 134, 144, 0.20)"
 FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', sans-serif"
 MAX_POINTS: Final = 1500
-"""Points of one line or cloud; longer ones are thinned out."""
+"""Points of a line or cloud; longer ones are thinned out."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """How a policy is drawn, everywhere the same.
+    """How a policy is drawn in every figure.
 
     Attributes:
         color: of dots and lines.
@@ -32,10 +32,10 @@ class Look:
     dash: str
 
 
-# The policies' classes state their looks in Okabe and Ito's colours, which colour-blind readers can tell apart, without
-# black and yellow, which do not read on dark and on light. There are too few of them, so symbols differ everywhere, and
-# dashes where two colours may be mistaken.
-_FREE_COLORS: Final = ("#009E73", "#E69F00")
+# The policies' classes state their looks, in colours based on Okabe and Ito's, which colour-blind readers can tell
+# apart; all have a contrast of 3 or more on the light and on the dark page. They are too few, so symbols differ
+# everywhere, and dashes where two colours are close.
+_FREE_COLORS: Final = ("#009E73", "#C98500")
 _FREE_SYMBOLS: Final = ("hexagon", "hourglass", "bowtie", "diamond-tall")
 _FREE_DASHES: Final = ("solid", "dash", "dot", "dashdot")
 
@@ -58,7 +58,7 @@ def _stated(name: str) -> Look | None:
 
 
 def _free(place: int) -> Look:
-    """A look that no known policy has."""
+    """A look that no classical policy has."""
     color, dash = place % len(_FREE_COLORS), place // len(_FREE_COLORS) % len(_FREE_DASHES)
     return Look(_FREE_COLORS[color], _FREE_SYMBOLS[place % len(_FREE_SYMBOLS)], _FREE_DASHES[dash])
 

@@ -1,26 +1,27 @@
-"""What a page shows of one environment's sweep: pictures and sentences."""
+"""One environment's sweep on a page: figures and sentences."""
 
 from typing import Any
 
 import pandas as pd
 
-from baselines.experiments.statistics import HIDE_ABOVE, significant
+from baselines.experiments.estimates import MIN_VERDICT_EPISODES, significant
+from baselines.experiments.statistics import HIDE_ABOVE
 from baselines.experiments.sweep import BOUND, Sweep
 from baselines.experiments.variations import FRONT, VARIATIONS
 from baselines.report.html import div
-from baselines.report.sweep_figures import Looks, front_figure, robustness_figure
-from baselines.report.words import number
+from baselines.report.sweep_figures import Looks, difference_figure, robustness_figure, trade_off_figure
+from baselines.report.text import number
 from formation_env.evaluation.statistics import paired_difference
 from formation_env.task.scenario import Scenario
 
 
 def section(index: int, scenario: Scenario, sweep: Sweep, looks: Looks) -> dict[str, Any] | None:
-    """All that the template `sweep_section` shows of one environment; None if nothing was flown there.
+    """Variables of the template `sweep_section` for one environment; None if nothing was flown there.
 
     Args:
         index: of the environment on the page.
         scenario: the environment.
-        sweep: its own share.
+        sweep: its own part.
         looks: of the policies and of the bound.
     """
     summary = sweep.summary
@@ -30,13 +31,17 @@ def section(index: int, scenario: Scenario, sweep: Sweep, looks: Looks) -> dict[
     bound = sweep.episodes[sweep.episodes["policy"] == BOUND]
     return {
         "weight": scenario.reward.error_weight,
-        "prices": summary.loc[summary["quantity"] == FRONT, "value"].unique().tolist(),
+        "weights": summary.loc[summary["quantity"] == FRONT, "value"].unique().tolist(),
         "episodes": sweep.episodes["seed"].nunique(),
+        "min_episodes": MIN_VERDICT_EPISODES,
         "bound_episodes": bound["seed"].nunique(),
         "aside": aside,
         "reading": reading(sweep.episodes, summary),
-        "front": div(front_figure(summary, looks, aside), f"front-{index}"),
+        "reference": str(summary["reference"].iloc[0]),
+        "compared": summary.loc[summary["policy"] != BOUND, "policy"].nunique() > 1,
+        "trade_off": div(trade_off_figure(summary, looks, aside), f"trade-off-{index}"),
         "robustness": div(robustness_figure(summary, looks, aside), f"robustness-{index}"),
+        "differences": div(difference_figure(summary, looks, aside), f"differences-{index}"),
     }
 
 
@@ -62,18 +67,18 @@ def reading(episodes: pd.DataFrame, summary: pd.DataFrame) -> list[str]:
 
 
 def _against_bound(episodes: pd.DataFrame) -> list[str]:
-    """How far above the bound the policies are along the front, on the bound's seeds."""
+    """Cost ratio of the policies along the trade-off, on the bound's seeds."""
     costs = episodes[episodes["quantity"] == FRONT].pivot(index=["value", "seed"], columns="policy", values="cost_m_s")
     if BOUND not in costs:
         return []
     costs = costs.dropna()
     ratios = costs.drop(columns=BOUND).div(costs[BOUND], axis=0).groupby("value").mean()
     spans = [f"{name} {number(ratios[name].min())} to {number(ratios[name].max())}" for name in ratios]
-    return [f"Cost over the bound along the front, on the bound's seeds: {', '.join(spans)} times."]
+    return [f"Cost over the bound along the trade-off, on the bound's seeds: {', '.join(spans)} times."]
 
 
 def _winners(quantity: str, episodes: pd.DataFrame) -> str:
-    """Who costs least, at which values."""
+    """Policies of lowest cost, and at which values."""
     variation, where = VARIATIONS[quantity], dict[str, list[str]]()
     for value, flown in episodes.groupby("value"):
         text = variation.names.get(float(str(value)), f"{value:g}")
@@ -85,9 +90,14 @@ def _winners(quantity: str, episodes: pd.DataFrame) -> str:
 
 
 def _cheapest(flown: pd.DataFrame) -> str:
-    """The policy of least mean cost at a point, and those that its paired interval does not tell from it."""
+    """The policy of lowest mean cost at a point, and those that do not differ from it significantly.
+
+    With too few episodes for a verdict, the lowest mean alone.
+    """
     ranking = flown.groupby("policy")["cost_m_s"].mean().sort_values().index
     tables = [flown[flown["policy"] == name] for name in ranking]
+    if len(tables[0]) < MIN_VERDICT_EPISODES:
+        return str(ranking[0])
     near = [
         str(name)
         for name, table in zip(ranking[1:], tables[1:], strict=True)

@@ -65,7 +65,7 @@ class FlightJob:
         """Duration in steps of one law; the number of seeds hardly matters."""
         return self.scenario.num_steps * (_ENVIRONMENT_COST + len(self.laws))
 
-    def fly(self, progress: Callable[[int], Any]) -> Flights:
+    def run(self, progress: Callable[[int], Any]) -> Flights:
         """Fly it; progress is called with the cost completed since the last call."""
         share = _ENVIRONMENT_COST + len(self.laws)
         return fly_laws(

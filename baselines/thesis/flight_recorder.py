@@ -1,6 +1,6 @@
 """Recorder of batched flights: sums every step, keeps some instants."""
 
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from formation_env.envs import interface
 from formation_env.numerics.arrays import Array
 from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import legs
+
+MEASUREMENT: Final = "measurement"
+"""Info of an environment made with `analysis=True`."""
 
 
 def recorded_steps(scenario: Scenario, every: int) -> NDArray[np.intp]:
@@ -55,17 +58,16 @@ class FlightRecorder:
         self._few_thrusts = np.empty((count, shape[0], few, 3), np.float32)
         self._measurements = np.full((count, shape[0], few, 3), np.nan, np.float32)
 
-    def add(
-        self, infos: dict[str, Any], ended: NDArray[np.bool_] | None = None, measurement: Array | None = None
-    ) -> None:
+    def add(self, infos: dict[str, Any], ended: NDArray[np.bool_] | None = None) -> None:
         """Add the next instant, with the rows that ended at it; rows whose episode ended before give NaN."""
         self._positions[self._filled] = infos["true_state"][:, :3] - self._path[self._step, :3]
         self._thrusts[self._filled] = infos[interface.INFO_THRUST]
         self._positions[self._filled, ~self._going] = self._thrusts[self._filled, ~self._going] = np.nan
         self._filled += 1
         if self._step == self._steps[self._place]:
-            if measurement is not None:
-                self._measurements[self._place] = measurement
+            if MEASUREMENT in infos:
+                received = np.where(infos["measured"][:, None], infos[MEASUREMENT][:, :3], np.nan)
+                self._measurements[self._place] = self._first_few(received)
             self._keep(infos)
         self._step += 1
         if ended is not None:

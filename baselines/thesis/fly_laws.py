@@ -3,10 +3,11 @@
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
+import numpy as np
+
 from baselines.design.guidance import GuidanceName
 from baselines.experiments.policy_batch import SideBySide
-from baselines.thesis.flight_recorder import FlightRecorder, recorded_steps
-from baselines.thesis.measurement_probe import MeasurementProbe, with_final_infos
+from baselines.thesis.flight_recorder import MEASUREMENT, FlightRecorder, recorded_steps
 from baselines.thesis.recorded_flights import Flights
 from formation_env.envs import interface
 from formation_env.envs.vector import FormationVectorEnv
@@ -42,19 +43,28 @@ def fly_laws(
         start: true LVLH state (6,) to start at in place of the scenario's start and its spread, m and m/s.
         progress: called with the number of steps completed since the last call, over all rows.
     """
-    env, batch = FormationVectorEnv(len(policies) * len(seeds), scenario), SideBySide(policies)
+    env = FormationVectorEnv(len(policies) * len(seeds), scenario, analysis=measured)
+    batch = SideBySide(policies)
     options = None if start is None else {interface.START_OPTION: start}
     observations, infos = env.reset(seed=[*seeds] * len(policies), options=options)
     log = FlightRecorder(scenario, (len(policies), len(seeds)), recorded_steps(scenario, every), few, guide)
-    probe = MeasurementProbe(scenario, len(policies), seeds[:few], options) if measured else None
-    log.add(infos, measurement=probe.seen if probe else None)
+    log.add(infos)
     for _ in range(scenario.num_steps):
         actions = batch.predict(observations)[0]
         observations, _, terminations, truncations, infos = env.step(actions)
         ended = terminations | truncations
-        infos = with_final_infos(infos) if ended.any() else infos
-        if probe:
-            probe.step(actions)
-        log.add(infos, ended, probe.seen if probe else None)
+        infos = _with_final_infos(infos) if ended.any() else infos
+        log.add(infos, ended)
         progress(env.num_envs)
     return log.flights(tuple(int(seed) for seed in seeds))
+
+
+def _with_final_infos(infos: dict[str, Any]) -> dict[str, Any]:
+    """Infos of a step; those of ended episodes replace those of the episodes that follow them."""
+    finals, ended = infos["final_info"], infos["_final_info"]
+    merged = dict(infos)
+    for name in ("true_state", "estimate", "measured", interface.INFO_THRUST, MEASUREMENT):
+        if name in finals:
+            mask = ended if finals[name].ndim == 1 else ended[:, None]
+            merged[name] = np.where(mask, finals[name], infos[name])
+    return merged

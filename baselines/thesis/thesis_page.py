@@ -9,7 +9,7 @@ import jinja2
 import numpy as np
 import pandas as pd
 
-from baselines.report.words import number
+from baselines.report.text import number
 from baselines.thesis.claims.claim import Claim, Verdict
 
 

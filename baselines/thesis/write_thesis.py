@@ -91,7 +91,7 @@ def write_thesis(out: Path, options: ThesisOptions, command: str, workers: int) 
     """
     if options.step_warning:
         print(options.step_warning, file=sys.stderr)
-    flown = parallel.fly(_jobs(options), workers)
+    flown = parallel.run_with_bar(_jobs(options), workers)
     contents: dict[str, bytes] = {}
     with style.settings():
         bar = tqdm(FIGURES.items(), desc="drawing", unit="figure", dynamic_ncols=True)
@@ -112,10 +112,10 @@ def write_thesis(out: Path, options: ThesisOptions, command: str, workers: int) 
     return out / PAGE
 
 
-def _jobs(options: ThesisOptions) -> dict[str, parallel.Work]:
+def _jobs(options: ThesisOptions) -> dict[str, parallel.Job]:
     """All jobs of a reproduction, by name."""
     test_seeds = seeds("test", options.episodes)
-    jobs: dict[str, parallel.Work] = dict(figure_flights.figure_jobs(test_seeds, options.step_s, options.periods))
+    jobs: dict[str, parallel.Job] = dict(figure_flights.figure_jobs(test_seeds, options.step_s, options.periods))
     if options.claims:
         jobs |= claims_table.claim_jobs(options.claim_options)
     if options.models:

@@ -13,7 +13,6 @@ from formation_env.envs import interface
 from formation_env.kernel.metrics import episode_metrics
 from formation_env.kernel.simulation import RESULT_PLACES, Simulation
 from formation_env.rendering.modes import FRAMES_PER_S, RENDER_MODES
-from formation_env.rendering.moment import Trail
 from formation_env.task.loading import load_scenario
 from formation_env.task.scenario import Scenario
 
@@ -65,7 +64,11 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self._analysis = analysis
         self._keyed = False
         self._renderer: Any = None
-        self._trail = None if render_mode is None else Trail(self.scenario)
+        self._trail: Any = None
+        if render_mode is not None:
+            from formation_env.rendering.moment import Trail
+
+            self._trail = Trail(self.scenario)
 
     @property
     def spec(self) -> EnvSpec | None:
@@ -103,7 +106,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self._renderer.restart()
         if self._trail is not None:
             self._trail.clear()
-            self._show(self._trail)
+            self._show()
         return observations[0], self._info(self.simulation.first_row_results())
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
@@ -129,7 +132,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if terminated or truncated:
             info[interface.TOTALS] = {name: float(value[0]) for name, value in episode_metrics(simulation).items()}
         if self._trail is not None:
-            self._show(self._trail)
+            self._show()
         return observations[0], values[_REWARD], terminated, truncated, info
 
     def _info(self, values: list[float]) -> dict[str, Any]:
@@ -143,9 +146,9 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             info |= {name: value[0] for name, value in interface.analysis_infos(simulation).items()}
         return info
 
-    def _show(self, trail: Trail) -> None:
+    def _show(self) -> None:
         """Record where the follower is now; in mode `human` draw it."""
-        trail.record(self.simulation)
+        self._trail.record(self.simulation)
         if self.render_mode == "human":
             self.render()
 

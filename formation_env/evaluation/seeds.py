@@ -2,6 +2,8 @@
 
 from typing import Final, Literal
 
+from formation_env.settings import ConfigError
+
 Split = Literal["test", "validation", "tuning", "training"]
 
 _SIZE: Final = 1_000_000
@@ -20,6 +22,6 @@ def seeds(split: Split, count: int) -> range:
         ValueError: the split has fewer seeds.
     """
     if not 1 <= count <= _SIZE:
-        raise ValueError(f"seeds: count must be between 1 and {_SIZE}, got {count}")
+        raise ConfigError(f"seeds: count must be between 1 and {_SIZE}, got {count}")
     first = _ORDER.index(split) * _SIZE
     return range(first, first + count)

@@ -100,7 +100,7 @@ class TunedComparison:
         steps = keeping(self.truth, self.fails, self.options, TUNING_STEP_S).num_steps
         return 3 * len(LAWS) * self.options.candidates**2 * steps
 
-    def fly(self, progress: Callable[[int], Any]) -> list[dict[str, Any]]:
+    def run(self, progress: Callable[[int], Any]) -> list[dict[str, Any]]:
         """Lines per error weight: the tuned laws' costs and their difference with its 95 % interval."""
         chosen = {law: self._tuned(law) for law in LAWS}
         progress(self.cost // 2)

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from baselines.report.words import number
+from baselines.report.text import number
 from baselines.thesis import figure_flights
 from baselines.thesis.figures.drawings import (
     CORRECTED_LQR,

@@ -92,7 +92,7 @@ class Trial:
         """Duration in steps of one law; most of it is the design of the laws."""
         return 5_000 * len(self.comparison.laws)
 
-    def fly(self, progress: Callable[[int], Any] = lambda _: None) -> pd.DataFrame:
+    def run(self, progress: Callable[[int], Any] = lambda _: None) -> pd.DataFrame:
         """Lines by episode: scenario, truth, policy, seed, cost_m_s, delta_v_m_s, position_error_mean_m."""
         settings = config_folder("baselines") / f"{self.comparison.settings}.yaml"
         policies = [make_policy(law, self.scenario, settings) for law in self.comparison.laws]

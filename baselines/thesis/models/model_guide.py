@@ -5,7 +5,7 @@ from typing import Final
 import numpy as np
 import pandas as pd
 
-from baselines.report.words import number
+from baselines.report.text import number
 from baselines.thesis.models import closed_loop_costs
 from baselines.thesis.models.open_loop_errors import MODELS, SIZES_M, SPANS, about, leader
 from formation_env.numerics.arrays import Array

@@ -119,7 +119,7 @@ class Survey:
         """Duration in steps of one law."""
         return 15_000
 
-    def fly(self, progress: Callable[[int], Any] = lambda _: None) -> pd.DataFrame:
+    def run(self, progress: Callable[[int], Any] = lambda _: None) -> pd.DataFrame:
         """Compute one line per model, formation, size and span: j2, inclination_deg, eccentricity, these, error_m."""
         closed = closing(self.orbit)
         states = np.array(

@@ -7,7 +7,7 @@ from typing import Any, Final
 import pandas as pd
 from matplotlib.figure import Figure
 
-from baselines.experiments.parallel import Work
+from baselines.experiments.parallel import Job
 from baselines.thesis.figures import style
 from baselines.thesis.models import closed_loop_costs, model_figures, model_guide, open_loop_errors
 from baselines.thesis.thesis_page import Content, PageTable, Picture
@@ -38,7 +38,7 @@ class ModelResults:
     costs: pd.DataFrame
 
 
-def model_jobs(seeds: Sequence[int]) -> dict[str, Work]:
+def model_jobs(seeds: Sequence[int]) -> dict[str, Job]:
     """All jobs of the section by name; seeds are those of the closed loops."""
     surveys = [open_loop_errors.Survey(orbit) for orbit in open_loop_errors.leaders()]
     trials = [
@@ -46,7 +46,7 @@ def model_jobs(seeds: Sequence[int]) -> dict[str, Work]:
         for comparison in closed_loop_costs.COMPARISONS
         for truth in comparison.truths()
     ]
-    jobs: list[tuple[str, Work]] = [*((ERRORS, survey) for survey in surveys), *((COSTS, trial) for trial in trials)]
+    jobs: list[tuple[str, Job]] = [*((ERRORS, survey) for survey in surveys), *((COSTS, trial) for trial in trials)]
     return {f"{head}{index}": job for index, (head, job) in enumerate(jobs)}
 
 

@@ -26,6 +26,7 @@ from agents.results.report import Learned, envs_of, parse_models
 from baselines.controllers.registry import POLICIES
 from baselines.experiments.policy_factories import describe
 from baselines.experiments.sweep import points
+from baselines.report import ReportOptions
 from formation_env import ENV_IDS, ConfigError, Scenario, load_scenario
 from formation_env.cli_errors import WRONG_INPUT
 from formation_env.evaluation.rollout import evaluate
@@ -143,7 +144,7 @@ def test_fronts_fly_a_learned_policy_as_it_is(policies: Path) -> None:
     learned = Learned("ppo", (policies / f"ppo_initialization{TENSORS}",))
     factory = pickle.loads(pickle.dumps(learned))  # as it gets to another process
     front = points({START: load_scenario("initialization")}, {"ppo": factory}, seeds("test", EPISODES), 0)
-    cheap, dear = (front[f"{START} error_weight {value}"].fly(lambda steps: None) for value in (0.1, 10))
+    cheap, dear = (front[f"{START} error_weight {value}"].run(lambda steps: None) for value in (0.1, 10))
     np.testing.assert_array_equal(cheap["delta_v_m_s"], dear["delta_v_m_s"])
     paid = [table["cost_m_s"] - table["delta_v_m_s"] for table in (cheap, dear)]
     np.testing.assert_allclose(paid[1], 100 * paid[0], rtol=1e-9)  # sums round differently
@@ -185,7 +186,7 @@ def test_what_is_shipped_flies_where_it_was_trained(
     """By default the registered ids, and scenarios that a shipped policy was trained on and that have no id."""
     write_policy(policies, "ppo", "bad_communication")
     flown: list[list[str]] = []
-    monkeypatch.setattr(report, "write_report", lambda _, envs, *rest: flown.append(list(envs)) or tmp_path)
+    monkeypatch.setattr(report, "write_report", lambda _, envs, *rest, **more: flown.append(list(envs)) or tmp_path)
     assert run("report", "--out", tmp_path).exit_code == 0
     assert run("report", KEEPING, "--out", tmp_path).exit_code == 0
     assert flown == [[*ENV_IDS, "bad_communication"], [KEEPING]]
@@ -248,6 +249,27 @@ def test_pickle_is_refused_without_the_flag(tmp_path: Path, monkeypatch: pytest.
     assert result.exit_code == WRONG_INPUT
     assert "holds pickled objects, which may run any code when they are loaded; give --allow-pickle" in result.stderr
     assert result.stderr.count("\n") == 1
+
+
+def test_a_model_of_ones_own_enters_the_report(tmp_path: Path) -> None:
+    """A .zip flies on the environments that are named, with the power that it is given; not without permission."""
+    model, path = make_model(PPO, tmp_path)
+    options = ReportOptions(episodes=EPISODES, slow_episodes=1, sweep_episodes=0)
+    given = ([f"mine={path}"], [START], options, tmp_path / "out", "command", 1, ["lqr"])
+    with pytest.raises(ConfigError, match="give --allow-pickle"):
+        report.report_models(*given)
+    with pytest.raises(ConfigError, match="does not name its environment"):
+        report.report_models([f"mine={path}"], None, options, tmp_path / "out", "command", allow_pickle=True)
+    with pytest.raises(ConfigError, match="needs a label of its own"):
+        report.report_models([f"mine={path}"] * 2, [START], options, tmp_path / "out", "command", allow_pickle=True)
+    assert not (tmp_path / "out").exists()
+    report.report_models(*given, allow_pickle=True, throttle_power=2.0)
+    table = pd.read_csv(tmp_path / "out" / "episodes.csv")
+    expected = evaluate(Sb3Policy(model, 2.0), START, seeds("test", EPISODES))
+    assert set(table["policy"]) == {"lqr", "mine"}
+    np.testing.assert_allclose(table.loc[table["policy"] == "mine", "return"], expected["return"], rtol=1e-6)
+    first = report.UserModel(path).settings(load_scenario("keeping"))
+    assert first != report.UserModel(path, 2.0).settings(load_scenario("keeping"))
 
 
 def test_a_shipped_file_is_evaluated_against_the_bound(policies: Path, tmp_path: Path) -> None:

@@ -10,7 +10,8 @@ from scipy import stats
 from agents.policy.library import Card, Interval, Trained
 from agents.results.report_table import COLUMNS, learned_table
 from baselines.experiments.comparison import Flown
-from baselines.experiments.statistics import Results, analyse, ratio_of_means
+from baselines.experiments.estimates import ratio_of_means
+from baselines.experiments.statistics import Results, analyse
 from formation_env import Scenario, load_scenario
 from formation_env.kernel.metrics import METRICS
 
@@ -69,7 +70,7 @@ CARD = Card(
 
 def cells(results: Results, card: Card) -> dict[str, str]:
     """The one line of a table, by its headings."""
-    (row,) = learned_table([results], {"ppo": [card]}).rows
+    (row,) = learned_table([results], {"ppo": [card]}).texts()
     return dict(zip(COLUMNS, row, strict=True))
 
 
@@ -103,7 +104,7 @@ def test_the_best_of_all_may_have_flown_fewer_seeds() -> None:
     """It is held against the policy on these alone."""
     text = cells(flown(KEEPING, "keeping", COSTS), CARD)["over best classical"]
     assert text.endswith(" (mpc, 4 of 30 seeds)")
-    assert ratio_of(text)[0] == pytest.approx(COSTS["ppo"][:4].mean() / COSTS["mpc"].mean(), abs=6e-4)
+    assert ratio_of(text)[0] == pytest.approx(COSTS["ppo"][:4].mean() / COSTS["mpc"].mean(), abs=6e-3)
 
 
 def test_a_policy_over_itself_is_one() -> None:
@@ -116,13 +117,14 @@ def test_the_card_gives_what_training_took() -> None:
     """Means over the runs; unknown times of pretraining are not taken for none, one run has no interval over runs."""
     results = flown(KEEPING, "keeping", COSTS)
     found = cells(results, CARD)
-    assert (found["training seeds"], found["steps of each"]) == ("2", "2,000,000")
-    assert found["over training seeds, m/s"] == "0.910 [0.900, 0.920]"
-    assert found["wall time of each, min"] == "1.5 + 0.8"
-    assert (found["an action takes"], found["mpc's takes"]) == ("20 µs", "10 ms")
+    assert (found["training seeds"], found["steps per run"]) == ("2", "2,000,000")
+    assert found["mean over training seeds, m/s"] == "0.910 [0.900, 0.920]"
+    assert (found["pretraining per run, min"], found["RL per run, min"]) == ("1.5", "0.8")
+    assert (found["time per action, µs"], found["time per action of mpc, µs"]) == ("20", "10,000")
     alone = replace(CARD, runs=(run_of(0, None, 30.0),), cost_over_runs_m_s=None)
     found = cells(results, alone)
-    assert (found["wall time of each, min"], found["over training seeds, m/s"]) == ("? + 0.5", "–")
+    assert (found["pretraining per run, min"], found["RL per run, min"]) == ("–", "0.5")
+    assert found["mean over training seeds, m/s"] == "–"
 
 
 def test_a_line_for_each_environment_that_was_trained_on() -> None:
@@ -140,7 +142,7 @@ def test_a_line_for_each_environment_that_was_trained_on() -> None:
 def test_nothing_to_compare_with_is_a_dash() -> None:
     """Without classical policies and without a bound."""
     alone = {"ppo": COSTS["ppo"]}
-    results = replace(flown(KEEPING, "keeping", alone), cost_ratios={})
+    results = replace(flown(KEEPING, "keeping", alone), cost_ratios={}, cost_ratios_flown={})
     found = cells(results, CARD)
-    names = ("cost over bound", "over best LQR or SMC", "over best classical", "mpc's takes")
+    names = ("cost over bound", "over best LQR or SMC", "over best classical", "time per action of mpc, µs")
     assert [found[name] for name in names] == ["–"] * 4

@@ -1,5 +1,6 @@
 """Hyperparameters, training runs, saved models and the command line."""
 
+import inspect
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -17,6 +18,8 @@ from agents.algorithms.ppo import PPOSettings
 from agents.algorithms.registry import load_settings
 from agents.algorithms.sac import SACSettings
 from agents.cli import app
+from agents.cli import train as train_command
+from agents.hyperparameters import VALIDATION_EPISODES, VALIDATIONS
 from agents.results.evaluate import Sb3Policy
 from agents.training.run_folder import (
     BEST,
@@ -87,11 +90,11 @@ def test_a_plainly_loaded_model_acts_like_the_actor(finished: tuple[Run, Path]) 
     np.testing.assert_allclose(*returns, rtol=1e-4)
 
 
-def test_a_run_s_model_needs_no_throttle_power(finished: tuple[Run, Path]) -> None:
+def test_the_model_of_a_run_needs_no_throttle_power(finished: tuple[Run, Path]) -> None:
     """It has its own; given another, it would be applied twice."""
     run, folder = finished
     assert_refused(
-        ["evaluate", str(folder / MODEL), "--env", run.env, "--allow-pickle", "--throttle-power", "2"],
+        ["evaluate", str(folder / MODEL), run.env, "--allow-pickle", "--throttle-power", "2"],
         f"--throttle-power: leave it out; {folder / MODEL} applies its own, 2.0",
         last=True,
     )
@@ -263,3 +266,10 @@ def test_what_would_fail_later_is_refused_at_once(
     with pytest.raises(ConfigError, match=fault):
         train(small_run(tmp_path, "ppo", agent, **changes), tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+def test_the_defaults_of_the_command_line_are_those_of_a_run() -> None:
+    """The command line states its defaults without importing what it runs."""
+    given = inspect.signature(train_command).parameters
+    assert given["validations"].default == VALIDATIONS
+    assert given["validation_episodes"].default == VALIDATION_EPISODES

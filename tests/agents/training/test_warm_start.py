@@ -67,7 +67,7 @@ def test_a_start_flies_as_the_file_says(algorithm: str, activation: str, agent: 
         ),
         (random_actor("clip"), "squash: must be tanh"),
         (random_actor("tanh", power=3.0), "throttle_power: must be 2.0"),
-        (None, "cannot be read"),
+        (None, "no such file or folder"),
     ],
 )
 def test_a_start_that_does_not_fit_is_one_line(tmp_path: Path, actor: Actor | None, fault: str) -> None:

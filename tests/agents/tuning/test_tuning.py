@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from agents_helpers import PRETRAINED, SMALL, assert_refused, small_run
+from damage_helpers import refusals
 from optuna.trial import FrozenTrial, TrialState
 from typer.testing import CliRunner
 
@@ -195,3 +196,16 @@ def test_mistakes_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     assert_refused(command(tmp_path, "--start", str(tmp_path / "none.safetensors")), "none.safetensors")
     monkeypatch.setitem(sys.modules, "optuna", None)
     assert_refused(command(tmp_path), "needs optuna; in a checkout: pip install -e '.[optimal]', or make")
+
+
+def test_a_damaged_journal_is_refused_or_gives_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A byte inverted or a cut in the journal: one line that names it, or the result of the whole journal."""
+    monkeypatch.setattr(searching, "train", bowl)
+    run, journal = small_run(tmp_path, "ppo"), tmp_path / "study" / JOURNAL
+    result = search(run, 2, tmp_path / "study")
+    content = journal.read_bytes()
+
+    def read() -> None:
+        assert search(run, 2, tmp_path / "study") == result
+
+    assert len(refusals(journal, content, read, len(content), stride=37, cuts=10)) > len(content) / 37 / 2

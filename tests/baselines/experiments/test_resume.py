@@ -15,14 +15,13 @@ import pandas as pd
 import pytest
 
 from baselines.controllers.reference_policies import Zero, ZeroSettings
-from baselines.experiments import run_comparison
+from baselines.experiments.cached_jobs import FOLDER, CachedJob, cached, place_of, read_table
 from baselines.experiments.episodes import ACTION_TIME, CHUNK, Episodes, Flight, episode_jobs
 from baselines.experiments.policy_factories import Classical
-from baselines.experiments.result_cache import FOLDER, Kept, keep, path_of, read
-from baselines.experiments.run_comparison import Found
-from baselines.report import Wanted, write_report
-from baselines.report.write_sweep import Wanted as WantedSweep
-from baselines.report.write_sweep import write_sweep
+from baselines.experiments.run_comparison import ComparisonData, run_comparison
+from baselines.report import ReportOptions, write_report
+from baselines.report.write_sweep import SweepOptions, write_sweep
+from baselines.result_cache import SUFFIX
 from formation_env import Scenario, load_scenario
 from formation_env.evaluation.rollout import record
 from formation_env.settings import build
@@ -31,7 +30,15 @@ SHORT = {
     "title": "short",
     "phases": [{"formation": {"kind": "following", "y0_m": 200}, "transfer_orbits": 0.05, "hold_orbits": 0.05}],
 }
-WANTED = Wanted(4, 2, sweep_episodes=2, sweep_bound_episodes=0, resume=True, slow=("slow",), unswept=("slow",))
+OPTIONS = ReportOptions(
+    episodes=4,
+    slow_episodes=2,
+    sweep_episodes=2,
+    sweep_bound_episodes=0,
+    resume=True,
+    slow=("slow",),
+    unswept=("slow",),
+)
 COMMAND = "python -m baselines report --resume"
 
 
@@ -78,14 +85,14 @@ def scenario() -> Scenario:
     return build(Scenario, SHORT, "test")
 
 
-def fly(out: Path, factory: Coast, wanted: Wanted = WANTED) -> tuple[int, Found]:
+def fly(out: Path, factory: Coast, options: ReportOptions = OPTIONS) -> tuple[int, ComparisonData]:
     """Fly a fast and a slow policy, as the report does; how many actions that took, and what was found."""
     before = factory.counter.actions
-    found = run_comparison.fly({"fast": factory, "slow": factory}, {"short": scenario()}, wanted, out, 1)
+    found = run_comparison({"fast": factory, "slow": factory}, {"short": scenario()}, options, out, 1)
     return factory.counter.actions - before, found
 
 
-def assert_equal(one: Found, other: Found) -> None:
+def assert_equal(one: ComparisonData, other: ComparisonData) -> None:
     """The same episodes, flights and points, but for the times of actions."""
     pd.testing.assert_frame_equal(one.sweep.episodes, other.sweep.episodes, check_exact=True)
     for name in ("fast", "slow"):
@@ -139,16 +146,16 @@ def test_killed_it_goes_on(tmp_path: Path) -> None:
     """SIGKILL in the second round leaves whole files, which another process finds under the same names and uses."""
     env, out = tmp_path / "short.yaml", tmp_path / "out"
     env.write_text(json.dumps(SHORT))
-    arguments = ["--env", env, "--policy", "lqr", "--out", out, "--episodes", 2, "--sweep-episodes", 2]
+    arguments = [env, "--policy", "lqr", "--out", out, "--episodes", 2, "--sweep-episodes", 2]
     arguments += ["--bound-episodes", 0, "--resume", "--processes", 1]
     with started("-m", "baselines", "report", *arguments):
-        wait_until(lambda: len(list(out.glob(f"{FOLDER}/point_*.npz"))) >= 2)
-    kept = {path: path.stat().st_mtime_ns for path in out.glob(f"{FOLDER}/[a-z]*.npz")}
+        wait_until(lambda: len(list(out.glob(f"{FOLDER}/point_*{SUFFIX}"))) >= 2)
+    kept = {path: path.stat().st_mtime_ns for path in out.glob(f"{FOLDER}/[a-z]*{SUFFIX}")}
     assert not (out / "report.html").exists()
-    wanted = Wanted(2, sweep_episodes=2, sweep_bound_episodes=0, resume=True)
-    write_report({"lqr": Classical("lqr")}, [env], wanted, out, COMMAND)
+    options = ReportOptions(episodes=2, sweep_episodes=2, sweep_bound_episodes=0, resume=True)
+    write_report({"lqr": Classical("lqr")}, [env], options, out, COMMAND)
     assert {path: path.stat().st_mtime_ns for path in kept} == kept
-    assert len(list(out.glob(f"{FOLDER}/[a-z]*.npz"))) > len(kept)
+    assert len(list(out.glob(f"{FOLDER}/[a-z]*{SUFFIX}"))) > len(kept)
 
 
 SLEEPER = """
@@ -159,7 +166,7 @@ from baselines.experiments.parallel import run
 class Sleeper:
     cost = 1
 
-    def fly(self, progress):
+    def run(self, progress):
         Path(sys.argv[1]).touch()
         time.sleep(600)
 
@@ -190,7 +197,7 @@ def test_nothing_old_is_used_unasked(tmp_path: Path) -> None:
     """Without --resume, with other settings, or with a damaged file it is flown."""
     first, _ = fly(tmp_path, Coast({"gain": 1.0}))
     assert fly(tmp_path, Coast({"gain": 2.0}))[0] == first
-    assert fly(tmp_path, Coast({"gain": 1.0}), replace(WANTED, resume=False))[0] == first
+    assert fly(tmp_path, Coast({"gain": 1.0}), replace(OPTIONS, resume=False))[0] == first
     for path in (tmp_path / FOLDER).iterdir():
         path.write_text("")
     assert fly(tmp_path, Coast({"gain": 1.0}))[0] == first
@@ -198,10 +205,10 @@ def test_nothing_old_is_used_unasked(tmp_path: Path) -> None:
 
 def test_the_sweep_is_resumed_too(tmp_path: Path) -> None:
     """The same for the sweep by itself."""
-    wanted = WantedSweep(episodes=2, bound_episodes=0, resume=True)
-    write_sweep({"coast": Coast({})}, [scenario()], wanted, tmp_path, COMMAND, 1)
+    options = SweepOptions(episodes=2, bound_episodes=0, resume=True)
+    write_sweep({"coast": Coast({})}, [scenario()], options, tmp_path, COMMAND, 1)
     before = (tmp_path / "sweep.csv").read_bytes()
-    write_sweep({"coast": Coast({}, Counter(left=0))}, [scenario()], wanted, tmp_path, COMMAND, 1)
+    write_sweep({"coast": Coast({}, Counter(left=0))}, [scenario()], options, tmp_path, COMMAND, 1)
     assert (tmp_path / "sweep.csv").read_bytes() == before
 
 
@@ -213,7 +220,7 @@ class Table:
     key: Any = "key"
     cost: int = 3
 
-    def fly(self, progress: Any) -> pd.DataFrame:
+    def run(self, progress: Any) -> pd.DataFrame:
         progress(self.cost)
         return self.table
 
@@ -222,22 +229,22 @@ def test_tables_are_kept_exactly(tmp_path: Path) -> None:
     """Floats to the last bit, flags, counts, what is missing, and labels that look like numbers or like nothing."""
     numbers = [1 / 3, np.nan, -1e-300, np.inf]
     table = pd.DataFrame({"policy": ["1", "NA", "", "nan"], "a": numbers, "b": [True, False, True, True], "seed": 7})
-    jobs = keep({"job": Table(table)}, tmp_path)
+    jobs = cached({"job": Table(table)}, tmp_path)
     told: list[int] = []
     for _ in range(2):  # flown, then read
-        pd.testing.assert_frame_equal(jobs["job"].fly(told.append), table, check_exact=True)
+        pd.testing.assert_frame_equal(jobs["job"].run(told.append), table, check_exact=True)
     assert told == [3, 3]
-    pd.testing.assert_frame_equal(read(path_of(tmp_path, Table(table))), table, check_exact=True)
-    assert [path.suffix for path in tmp_path.iterdir()] == [".npz"]
+    pd.testing.assert_frame_equal(read_table(place_of(tmp_path, Table(table))), table, check_exact=True)
+    assert [path.suffix for path in tmp_path.iterdir()] == [SUFFIX]
 
 
 def test_only_what_tells_its_settings_is_kept(tmp_path: Path) -> None:
     """Nobody knows whether an unknown policy is still the same."""
     unknown = Episodes(scenario(), "unknown", lambda original, believed: None, (0,), slow=False)
     known = Episodes(scenario(), "lqr", Classical("lqr"), (0,), slow=False)
-    kept = keep({"unknown": unknown, "known": known}, tmp_path)
-    assert kept["unknown"] is unknown
-    assert isinstance(kept["known"], Kept)
+    jobs = cached({"unknown": unknown, "known": known}, tmp_path)
+    assert jobs["unknown"] is unknown
+    assert isinstance(jobs["known"], CachedJob)
 
 
 def test_kept_files_are_told_apart_by_all_that_matters(tmp_path: Path) -> None:
@@ -251,7 +258,7 @@ def test_kept_files_are_told_apart_by_all_that_matters(tmp_path: Path) -> None:
         Episodes(scenario(), "lqr", Classical("lqr"), (0,), slow=False),
         Flight(keeping, "lqr", Classical("lqr"), 0, slow=False),
     ]
-    assert len({path_of(tmp_path, job) for job in jobs}) == len(jobs)
+    assert len({place_of(tmp_path, job) for job in jobs}) == len(jobs)
 
 
 def test_slow_policies_fly_the_first_seeds_in_small_jobs() -> None:
@@ -273,7 +280,7 @@ def test_an_action_is_timed_for_one_observation() -> None:
             return super().predict(observation, *arguments, **named)
 
     job = Flight(scenario(), "thinker", lambda original, believed: Thinker(believed, ZeroSettings()), 3, slow=False)
-    table = job.fly(lambda cost: None)
+    table = job.run(lambda cost: None)
     times_us = table[ACTION_TIME]
     assert np.isnan(times_us[0])
     assert (times_us[1:] >= 2000).all()

@@ -18,9 +18,9 @@ from baselines.experiments.policy_factories import Classical
 from baselines.experiments.sweep import BOUND, COLUMNS, METRICS, Point, mean_hold_error_m, points
 from baselines.experiments.variations import FRONT, VARIATIONS, lost_share
 from baselines.report import style
-from baselines.report.sweep_figures import front_figure, looks_of, robustness_figure
+from baselines.report.sweep_figures import looks_of, robustness_figure, trade_off_figure
 from baselines.report.sweep_section import expensive, reading
-from baselines.report.write_sweep import FILES, Wanted, write_sweep
+from baselines.report.write_sweep import FILES, SweepOptions, write_sweep
 from formation_env import ConfigError, Scenario, load_scenario
 from formation_env.evaluation.rollout import evaluate, record
 from formation_env.settings import build
@@ -32,7 +32,7 @@ SHORT = {
 }
 COMMAND = "python -m baselines sweep short.yaml --episodes 3"
 POLICIES = {name: Classical(name) for name in ("lqr", "smc")}
-WANTED = Wanted(episodes=3, bound_episodes=2)
+OPTIONS = SweepOptions(episodes=3, bound_episodes=2)
 TOLD = {FRONT, "sensor_noise", "thrust_limit", "initial_error"}
 CHANGES = {
     FRONT: {"reward.error_weight"},
@@ -66,7 +66,7 @@ def changed(one: Scenario, other: Scenario) -> set[str]:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("sweep") / "deep"
-    assert write_sweep(POLICIES, [build(Scenario, SHORT, "test")], WANTED, out, COMMAND, 1) == out / "sweep.html"
+    assert write_sweep(POLICIES, [build(Scenario, SHORT, "test")], OPTIONS, out, COMMAND, 1) == out / "sweep.html"
     return out
 
 
@@ -222,7 +222,7 @@ def test_gains_are_those_of_the_original() -> None:
     scenario = load_scenario("keeping")
     flown, believed = VARIATIONS["outage_length"].vary(scenario, 60.0)
     point = Point("keeping", (("outage_length", 60.0),), flown, believed, scenario, {"smc": Classical("smc")}, (0,))
-    table = point.fly(lambda _: None)
+    table = point.run(lambda _: None)
     own = evaluate(make_policy("smc", "keeping"), flown, [0])
     assert table["cost_m_s"].iloc[0] == -own["return"].iloc[0]
 
@@ -239,7 +239,7 @@ def test_a_policy_of_one_price_is_a_dot() -> None:
         rows += [(FRONT, value, "lqr", value, 10 / value), (FRONT, value, "ppo", 2.0, 3.0)]
     columns = ["quantity", "value", "policy", "delta_v_m_s", "position_error_mean_m"]
     front = pd.DataFrame(rows, columns=columns).assign(cost_m_s=1.0)
-    traces = drawn(front_figure(front, looks_of(["lqr", "ppo"]), ()))
+    traces = drawn(trade_off_figure(front, looks_of(["lqr", "ppo"]), ()))
     assert (traces["lqr"].mode, traces["ppo"].mode) == ("lines+markers", "markers")
     assert traces["ppo"].marker.color not in [look.color for look in style.looks(["lqr", "smc"]).values()]
 
@@ -253,7 +253,7 @@ def test_what_would_squash_the_others_starts_hidden(folder: Path) -> None:
     dear = lqr.assign(policy="dear", **{name: 4 * lqr[name] for name in measured})
     both = pd.concat([lqr, dear])
     assert expensive(both) == ["dear"]
-    for draw in (front_figure, robustness_figure):
+    for draw in (trade_off_figure, robustness_figure):
         figure, alone = (draw(table, looks_of(["lqr", "dear"]), ["dear"]) for table in (both, lqr))
         assert (drawn(figure)["dear"].visible, drawn(figure)["lqr"].visible in (None, True)) == ("legendonly", True)
         assert figure.layout.yaxis.range == alone.layout.yaxis.range
@@ -263,7 +263,7 @@ def test_files_are_complete(folder: Path, episodes: pd.DataFrame) -> None:
     """Three files and no temporaries; the page loads nothing; strict JSON whose means are pandas' of the lines."""
     assert sorted(path.name for path in folder.iterdir()) == sorted(FILES)
     page = (folder / "sweep.html").read_text(encoding="utf-8")
-    assert all(mark in page for mark in ("&lt;with&gt;", COMMAND, 'id="front-0"', 'id="robustness-0"'))
+    assert all(mark in page for mark in ("&lt;with&gt;", COMMAND, 'id="trade-off-0"', 'id="robustness-0"'))
     assert "<with>" not in page
     assert not any(mark in page for mark in ('src="http', "<link"))
     data = json.loads((folder / "sweep.json").read_text(encoding="utf-8"))
@@ -280,7 +280,7 @@ def test_the_reading_names_who_costs_least() -> None:
     rows = []
     for value, a, b, bound in ((0.1, 2.0, 3.0, 1.0), (10.0, 8.0, 6.0, 4.0)):
         rows += [(FRONT, value, name, 0, cost) for name, cost in (("a", a), ("b", b), (BOUND, bound))]
-    unlike = [(seed, sign * 1.0) for seed, sign in enumerate((1, -1, 1, -1, 1, -1, 1, -1))]
+    unlike = [(seed, sign * 1.0) for seed, sign in enumerate((1, -1) * 12)]
     for quantity in [name for name in VARIATIONS if name != FRONT]:
         rows += [(quantity, 0.0, "a", seed, 10.0) for seed, _ in unlike]
         rows += [(quantity, 0.0, "b", seed, 10.1 + difference) for seed, difference in unlike]
@@ -322,7 +322,7 @@ def test_what_does_not_fit_is_named(tmp_path: Path) -> None:
     """A step longer than the shortest outage, and an error without a price, by environment, key and value."""
     slow = build(Scenario, SHORT | {"dt_s": 90.0}, "test")
     with pytest.raises(ConfigError, match=r"outage_length = 60: dropout\.mean_outage_s: a mean of 60 s is shorter"):
-        write_sweep(POLICIES, [slow], WANTED, tmp_path, COMMAND, 1)
+        write_sweep(POLICIES, [slow], OPTIONS, tmp_path, COMMAND, 1)
     free = build(Scenario, SHORT | {"reward": {"error_weight": 0.0}}, "test")
-    with pytest.raises(ConfigError, match=r"reward\.error_weight: must be > 0 for a front, got 0"):
-        write_sweep(POLICIES, [free], WANTED, tmp_path, COMMAND, 1)
+    with pytest.raises(ConfigError, match=r"reward\.error_weight: must be > 0 for a trade-off, got 0"):
+        write_sweep(POLICIES, [free], OPTIONS, tmp_path, COMMAND, 1)

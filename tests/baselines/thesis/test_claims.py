@@ -86,7 +86,7 @@ def test_the_initialization_comes_out_as_printed(periods: float, error_m: float,
     With P of the scalar Riccati equation, K2 / K1 = sqrt(2) r^(1/4), r = 0.5 / n^2; the Coriolis force, left out
     there, is worth 1 % of it. The two greatest errors were found by another program.
     """
-    flights = figure_flights.initializations()[f"initialization {periods:g}"].fly(lambda cost: None)
+    flights = figure_flights.initializations()[f"initialization {periods:g}"].run(lambda cost: None)
     assert flights.max_error()[0, 0] == pytest.approx(error_m, abs=0.1)
     assert flights.max_accel()[0, 0] < limit_m_s2
     orbit = flights.scenario.orbit
@@ -103,7 +103,7 @@ def test_the_misprinted_frequency_gives_the_thesis_s_300_m() -> None:
     0.5 %.
     """
     scenario = replace(figure_flights.printed(QUIET.on(scenarios.keeping(1.0))))
-    flights = FlightJob(scenario, (figure_flights.LQR,), (0,), every=100).fly(lambda cost: None)
+    flights = FlightJob(scenario, (figure_flights.LQR,), (0,), every=100).run(lambda cost: None)
     n, k, r = 1.08308e-3, 1.42216e-3, 12000 / 1.08308e-3**2
     z_m = math.hypot(2000 * math.sqrt(3), 0.2 * math.sqrt(3) / n)
     K1 = math.sqrt(k**4 + 1 / r) - k**2

@@ -179,7 +179,7 @@ def test_initialization_is_the_printed_one(periods: float, error_m: float, accel
 
     The errors to 0.1 m are those of an independent prototype of the trajectory-following law (eq. 4.17-4.19).
     """
-    flights = figure_flights.initializations()[f"initialization {periods:g}"].fly(lambda cost: None)
+    flights = figure_flights.initializations()[f"initialization {periods:g}"].run(lambda cost: None)
     assert flights.max_error()[0, 0] == pytest.approx(error_m, abs=0.1)
     assert flights.max_accel()[0, 0] < accel_m_s2
 
@@ -191,7 +191,7 @@ def test_keeping_is_the_printed_one() -> None:
     The rest of the effort undoes the unknown start.
     """
     job = figure_flights.keepings((0,), periods=1.0)["keeping"]
-    flights = replace(job, laws=(figure_flights.LQR,)).fly(lambda cost: None)
+    flights = replace(job, laws=(figure_flights.LQR,)).run(lambda cost: None)
     assert flights.max_error()[0, 0] == pytest.approx(300.0, rel=0.02)
     assert flights.max_accel()[0, 0] < 4e-3
     assert flights.effort()[0, 0, 2] > 0.9 * flights.effort()[0, 0].sum()
@@ -255,7 +255,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, flown: dict[str, Flights]) 
     out = tmp_path_factory.mktemp("thesis") / "deep" / "folder"
     write_thesis.ThesisOptions(episodes=2, step_s=COARSE_S, periods=2.3, models=False)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(write_thesis.parallel, "fly", lambda wanted, workers: flown)
+        patch.setattr(write_thesis.parallel, "run_with_bar", lambda wanted, workers: flown)
         patch.setattr(claims_table, "tables", lambda flown, options: TABLES)
         page = write_thesis.write_thesis(
             out, write_thesis.ThesisOptions(episodes=2, step_s=COARSE_S, periods=2.3, models=False), "the <command>", 1
@@ -348,7 +348,7 @@ def test_the_command_warns_of_another_step(
     def stop(jobs: object, workers: int) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(write_thesis.parallel, "fly", stop)
+    monkeypatch.setattr(write_thesis.parallel, "run_with_bar", stop)
     for step_s, expected in ((COARSE_S, True), (1.0, False)):
         options = write_thesis.ThesisOptions(episodes=1, step_s=step_s, claims=False, models=False)
         with pytest.raises(KeyboardInterrupt):
@@ -364,7 +364,7 @@ def test_a_failure_leaves_the_old_files(folder: Path, monkeypatch: pytest.Monkey
         raise RuntimeError("no ink")
 
     monkeypatch.setitem(FIGURES, "5.27", replace(FIGURES["5.27"], draw=broken))
-    monkeypatch.setattr(write_thesis.parallel, "fly", lambda wanted, workers: {})
+    monkeypatch.setattr(write_thesis.parallel, "run_with_bar", lambda wanted, workers: {})
     for number in list(FIGURES)[:-1]:
         monkeypatch.delitem(FIGURES, number)
     with pytest.raises(RuntimeError, match="no ink"):

@@ -23,7 +23,7 @@ def errors() -> pd.DataFrame:
     """Surveys of the leaders that the sentences speak of."""
     spoken = [*model_guide.LEADERS.values(), leader(0.0)]
     bare = [leader(eccentricity=e, j2=False) for e in (0.0, 0.1)]
-    return pd.concat([Survey(orbit).fly() for orbit in (*spoken, *bare)], ignore_index=True)
+    return pd.concat([Survey(orbit).run() for orbit in (*spoken, *bare)], ignore_index=True)
 
 
 @pytest.fixture(scope="module")
@@ -140,7 +140,7 @@ def test_crossing_of_a_power_law(level: float, size_m: float) -> None:
 def test_trials_fly_all_laws_on_the_same_seeds() -> None:
     """One line per law and seed; each nonlinear truth changes something."""
     comparison = replace(closed_loop_costs.COMPARISONS[2], laws=("lqr", "smc"))
-    flown = [closed_loop_costs.Trial(comparison, truth, (0, 1)).fly() for truth in comparison.truths()]
+    flown = [closed_loop_costs.Trial(comparison, truth, (0, 1)).run() for truth in comparison.truths()]
     table = closed_loop_costs.summary(pd.concat(flown))
     assert len(table) == 2 * 3
     linear = table[table["truth"] == closed_loop_costs.LINEAR]
