@@ -209,9 +209,10 @@ def least_fuel_gains(
 ) -> Array:
     """Gains of a finite horizon that spend little fuel from a start on: iteratively reweighted least squares.
 
-    The sum of |u| is the limit of sums of w_k |u_k|^2 with w_k = 1 / |u_k| of the round before; it makes most of the
-    u_k vanish, so that the path is one of a few burns (Daubechies et al. 2010, doi 10.1002/cpa.20303). A control beyond
-    the limit is charged `OVERLOAD` times more, and the weights move by half of the way (in logarithm), lest they swing.
+    The sum of |u| is the limit of sums of w_k |u_k|^2 with w_k = 1 / |u_k| of the round before; it makes most of
+    the u_k vanish, so that the path is one of a few burns (Daubechies et al. 2010, doi 10.1002/cpa.20303). A
+    control beyond the limit is charged `OVERLOAD` times more; the weights move half of the way (in logarithm),
+    which damps oscillations.
 
     Args:
         Phi: state transition matrix (6, 6), or of each step (steps, 6, 6).
@@ -235,7 +236,7 @@ def least_fuel_gains(
     for _ in range(rounds):
         _, controls = closed_loop(Phi, Gamma, gains, start)
         overload = np.maximum(np.abs(controls).max(axis=1) / limit - 1.0, 0.0)
-        wanted = (1.0 + OVERLOAD * overload) / (np.linalg.norm(controls, axis=1) / limit + floor)
-        weights = np.sqrt(weights * wanted)
+        renewed = (1.0 + OVERLOAD * overload) / (np.linalg.norm(controls, axis=1) / limit + floor)
+        weights = np.sqrt(weights * renewed)
         gains = finite_horizon_gains(Phi, Gamma, no_cost, weights[:, None, None] * R, terminal)
     return gains

@@ -29,7 +29,7 @@ class StationaryFilter:
 
 
 def measurement(scenario: Scenario) -> tuple[Array, Array]:
-    """H (m, 6) of the sensor and R_noise (m, m) as the filter believes it."""
+    """H (m, 6) of the sensor and R_noise (m, m) of the filter model."""
     H = np.eye(6) if scenario.sensor.measures == "position_and_velocity" else np.eye(3, 6)
     sigma = np.repeat([scenario.filter_model.sigma_pos_m, scenario.filter_model.sigma_vel_m_s], 3)[: len(H)]
     return H, np.diag(sigma**2)

@@ -1,4 +1,4 @@
-"""What it takes to change orbits: two impulses, or the spiral of a thruster that never rests.
+"""Transfers between orbits: two impulses, or the spiral of a continuous low thrust.
 
 Legend: Phi transition matrix over the transfer, delta the effect of the constant disturbance.
 """
@@ -14,7 +14,7 @@ from formation_env.numerics.arrays import Array
 from formation_env.orbital.constants import MU_EARTH
 
 LEAST_LEVERAGE: Final = 1 / 30
-"""Of an impulse on the place that it should change, in units of the transfer time or of 1 / n; less is refused."""
+"""Least effect of an impulse on the position that it should change, in units of the transfer time or of 1 / n."""
 
 
 @dataclass(frozen=True)

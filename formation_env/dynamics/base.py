@@ -1,4 +1,4 @@
-"""What a linear model of the relative motion offers, and its exact discretisation.
+"""Interface of the linear models of relative motion, and their exact discretisation.
 
 Legend: A state matrix, B control matrix, d constant disturbance, Phi, Gamma, delta their discrete counterparts.
 State: LVLH [x, y, z, x', y', z'], m and m/s; x radial (outward), y along-track, z along the orbit normal.

@@ -1,6 +1,6 @@
 """The nonlinear truth: leader and follower in the inertial frame (ECI), each under the same forces.
 
-The leader does not depend on the follower, so its path is a table, made before the flight. What is integrated then is
+The leader does not depend on the follower, so its path is a table, made before the flight. The step integrates
 the follower's position relative to the leader along inertial axes, r = r_follower - r_leader, by
 
     r'' = a(r_leader + r) - a(r_leader) + thrust,
@@ -27,7 +27,7 @@ NODES: Final = (0.0, 1 / 3, 1 / 2, 2 / 3)
 FIELDS: Final = {"position": 0, "velocity": 3, "acceleration": 6, "x_axis": 9, "y_axis": 12, "z_axis": 15}
 """Where a node of the leader's table has which vector, all along ECI."""
 FAR_FIELDS: Final = {"sun": 18, "moon": 21}
-"""What follows if Sun or Moon matter."""
+"""Further vectors of a node if the Sun or the Moon acts."""
 NEAR_WIDTH: Final = 3 * len(FIELDS)
 FAR_WIDTH: Final = NEAR_WIDTH + 3 * len(FAR_FIELDS)
 MAX_SUBSTEP_S: Final = 60.0
@@ -96,7 +96,7 @@ def substeps(dt_s: float) -> int:
 
 @lru_cache(maxsize=4)
 def leader_table(world: World, craft: Spacecraft, dt_s: float, num_steps: int) -> Array:
-    """What the compiled step needs to know of the leader, one row for each step (num_steps, width).
+    """Table of the leader for the compiled step, one row for each step (num_steps, width).
 
     A row has the leader at `NODES` of each substep and at the end, `FIELDS` (and `FAR_FIELDS`) at each; then LVLH's
     angular velocity about x and z at the step's start and at its end.

@@ -16,7 +16,7 @@ from formation_env.orbital.orbit import Orbit
 
 @dataclass(frozen=True)
 class World:
-    """What the nonlinear truth is made of.
+    """Orbit and forces of the nonlinear truth.
 
     Attributes:
         orbit: the leader's osculating orbit at t = 0.

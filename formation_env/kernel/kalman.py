@@ -113,7 +113,7 @@ def thrust_noise_update_4(P: Symmetric4, Gamma: tuple[float, ...], ax: float, ay
 
 @inline_scalar
 def thrust_noise_update_2(P: Symmetric2, Gamma: tuple[float, float], az: float, variance: float) -> Symmetric2:
-    """The same of the cross-track axis."""
+    """Add the uncertainty of a thrust to the cross-track covariance, see `thrust_noise_update_4`."""
     g0, g1 = Gamma[0] * az, Gamma[1] * az
     return P[0] + variance * g0 * g0, P[1] + variance * g0 * g1, P[2] + variance * g1 * g1
 

@@ -110,7 +110,7 @@ def predict(
 
 @tile_function
 def predict_varying(tile: Array, width: Width, table: int, settings: packing.Scalars | None) -> None:
-    """The same by the row's own model, which the tile has at `table`."""
+    """Update in time by the model of the row, which stands in the tile at `table`."""
     for i in range(len(width)):
         model, noise = read_model(tile, i, table), read_process(tile, i, table)
         filter_time_update(tile, i, model, noise, own_scalars(tile, i, settings))

@@ -75,7 +75,7 @@ def fly_linear(tile: Array, width: Width, model: Model, settings: Scalars) -> No
 
 @tile_function
 def fly_varying(tile: Array, width: Width, table: int, settings: Scalars | None) -> None:
-    """The same with the row's own matrices, which the tile has at `table`."""
+    """x(k+1) = Phi x(k) + Gamma a + delta by the matrices of the row, which stand in the tile at `table`."""
     for i in range(len(width)):
         total_acceleration(tile, i, own_scalars(tile, i, settings))
     for i in range(len(width)):
@@ -175,7 +175,7 @@ def _near(tile: Array, node: int, state: int, rate: int, push: int, forces: Forc
 
 @inline_scalar
 def _distant(tile: Array, node: int, state: int, rate: int, forces: Forces) -> None:
-    """What Sun, Moon and sunlight add."""
+    """Add the accelerations by the Sun, the Moon and sunlight."""
     x, y, z = (
         tile[node] + tile[state],
         tile[node + LANES] + tile[state + LANES],
