@@ -4,16 +4,27 @@
 """
 
 from functools import lru_cache
-from typing import Any, Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from formation_env.dynamics import NONLINEAR, DiscreteModel
 from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE
 from formation_env.dynamics.nonlinear import leader_table, substeps
+from formation_env.kernel.unpacking import (
+    FILTER,
+    FORCES,
+    SCALARS,
+    SENSOR,
+    SIZE,
+    Forces,
+    Model,
+    ProcessNoise,
+    Scalars,
+    SensorNoise,
+)
 from formation_env.navigation.filter_settings import process_noise_covariance, upper_triangle
 from formation_env.numerics.arrays import Array
-from formation_env.numerics.jit import inline_scalar, spaced
 from formation_env.task.observation import observation_layout
 from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import build_schedule
@@ -23,88 +34,6 @@ TIME_INVARIANT: Final = 0
 TIME_VARYING: Final = 1
 NONLINEAR_NEAR: Final = 2  # gravity and drag
 NONLINEAR_FAR: Final = 3  # Sun, Moon and radiation pressure, too
-
-
-class Model(NamedTuple):
-    """A discrete dynamics model, its matrices row by row: orbit plane (x, y, x', y') and cross-track axis (z, z')."""
-
-    Phi_in_plane: Any  # 16
-    Gamma_in_plane: Any  # 8
-    delta_in_plane: Any  # 4
-    Phi_cross_track: Any  # 4
-    Gamma_cross_track: Any  # 2
-    delta_cross_track: Any  # 2
-
-
-class ProcessNoise(NamedTuple):
-    """The process noise that the filter believes in: upper triangles of its covariances over a step."""
-
-    Q_in_plane: Any  # 10
-    Q_cross_track: Any  # 3
-
-
-class SensorNoise(NamedTuple):
-    """The sensor that the filter believes in."""
-
-    variances: Any  # 2: of a measured position and velocity axis
-    measures: Any  # 2: 1 where the sensor measures positions, velocities
-
-
-class Forces(NamedTuple):
-    """What acts in the nonlinear truth."""
-
-    substeps: float
-    j2: float
-    density: float  # kg/m^3, at the base radius
-    base_radius: float
-    per_scale_height: float
-    drag_area: float  # per mass, m^2/kg
-    sun: float  # 1 if it pulls
-    moon: float
-    radiation_area: float  # per mass, m^2/kg
-
-
-class Scalars(NamedTuple):
-    """The settings of one number each."""
-
-    dt_s: float
-    num_steps: float
-    max_accel: float
-    min_accel: float
-    thrust_noise: float
-    filter_thrust_variance: float
-    process_noise: float
-    sigma_pos: float
-    sigma_vel: float
-    spread_pos: float
-    spread_vel: float
-    initial_variance_pos: float
-    initial_variance_vel: float
-    link_loss: float
-    link_fail: float
-    link_recover: float
-    linear_cost: float
-    quadratic_cost: float
-    max_distance: float
-    keep_out: float
-    tolerance: float
-    per_length: float
-    per_speed: float
-    per_log_age: float
-    per_phase: float
-
-
-MODEL_SIZE: Final = 36
-PROCESS_SIZE: Final = 13
-FILTER_SIZE: Final = MODEL_SIZE + PROCESS_SIZE
-SENSOR_SIZE: Final = 4
-FORCES_SIZE: Final = len(Forces._fields)
-SCALAR_SIZE: Final = len(Scalars._fields)
-FILTER: Final = MODEL_SIZE
-_SENSOR: Final = FILTER + FILTER_SIZE
-_FORCES: Final = _SENSOR + SENSOR_SIZE
-_SCALARS: Final = _FORCES + FORCES_SIZE
-SIZE: Final = _SCALARS + SCALAR_SIZE
 
 
 def truth_kind(scenario: Scenario) -> int:
@@ -145,10 +74,10 @@ def pack(scenario: Scenario) -> Array:
     if truth_kind(scenario) == TIME_INVARIANT:
         settings[:FILTER] = _model(scenario.true_dynamics())
     if filter_kind(scenario) == TIME_INVARIANT:
-        settings[FILTER:_SENSOR] = _filter(scenario)
-    settings[_SENSOR:_FORCES] = np.ravel(_sensor(scenario))
-    settings[_FORCES:_SCALARS] = _forces(scenario)
-    settings[_SCALARS:] = _scalars(scenario)
+        settings[FILTER:SENSOR] = _filter(scenario)
+    settings[SENSOR:FORCES] = np.ravel(_sensor(scenario))
+    settings[FORCES:SCALARS] = _forces(scenario)
+    settings[SCALARS:] = _scalars(scenario)
     return settings
 
 
@@ -167,58 +96,6 @@ def step_table(scenario: Scenario) -> Array:
         columns.append(leader_table(scenario.world, scenario.leader, scenario.dt_s, scenario.num_steps))
     plan = build_schedule(scenario)
     return np.hstack([plan, *(np.vstack([part[:1], part]) for part in columns)])
-
-
-@inline_scalar
-def unpack(s: Array) -> tuple[Model, Model, ProcessNoise, SensorNoise, Forces, Scalars]:
-    """The settings as tuples of scalars, so that the compiler need not read memory to know them."""
-    truth, filter_model, process = unpack_model(s, 0, 1), unpack_model(s, FILTER, 1), unpack_process(s, FILTER, 1)
-    return truth, filter_model, process, unpack_sensor(s, 0, 1), unpack_forces(s, 0, 1), unpack_scalars(s, 0, 1)
-
-
-@inline_scalar
-def unpack_model(s: Array, first: int, step: int) -> Model:
-    """A model from its MODEL_SIZE numbers.
-
-    Args:
-        s: where they are, among others.
-        first: place of the first.
-        step: from one to the next.
-    """
-    return Model(
-        spaced(s, first, step, 16),
-        spaced(s, first + 16 * step, step, 8),
-        spaced(s, first + 24 * step, step, 4),
-        spaced(s, first + 28 * step, step, 4),
-        spaced(s, first + 32 * step, step, 2),
-        spaced(s, first + 34 * step, step, 2),
-    )
-
-
-@inline_scalar
-def unpack_process(s: Array, first: int, step: int) -> ProcessNoise:
-    """The process noise behind the filter's model, which is at `first`."""
-    first += MODEL_SIZE * step
-    return ProcessNoise(spaced(s, first, step, 10), spaced(s, first + 10 * step, step, 3))
-
-
-@inline_scalar
-def unpack_sensor(s: Array, first: int, step: int) -> SensorNoise:
-    """The sensor out of all settings, which begin at `first`."""
-    first += _SENSOR * step
-    return SensorNoise(spaced(s, first, step, 2), spaced(s, first + 2 * step, step, 2))
-
-
-@inline_scalar
-def unpack_forces(s: Array, first: int, step: int) -> Forces:
-    """The forces out of all settings, which begin at `first`."""
-    return Forces(*spaced(s, first + _FORCES * step, step, FORCES_SIZE))
-
-
-@inline_scalar
-def unpack_scalars(s: Array, first: int, step: int) -> Scalars:
-    """The settings of one number each out of all settings, which begin at `first`."""
-    return Scalars(*spaced(s, first + _SCALARS * step, step, SCALAR_SIZE))
 
 
 def _block(matrices: Array, rows: Array, columns: Array) -> Array:

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_env.kernel import packing, variants
+from formation_env.kernel import packing, unpacking, variants
 from formation_env.kernel import tile as field
 from formation_env.kernel.stages import kalman_filter, memory, noise, observe, reward, start, thruster, true_motion
 from formation_env.kernel.tile import Width
@@ -60,12 +60,13 @@ def program(truth_kind: int, filter_kind: int, varied: bool) -> Program:
 # numba's cache looks only at the file of the outermost function; `source_hash`, a closure variable and so part of the
 # cache's key, makes it see the others too. A closure may hold numbers only, since functions are new in each process.
 # That is why a stage that depends on a kind is chosen by `if` on closure variables: numba drops the other branches
-# before it types them. The choice must stand in the outermost function, which therefore is longer than others.
+# before it types them. The choice must stand in the outermost function.
 
 
+# Long: the choice of stages must stand in the outermost function, see above.
 def _step(source_hash: int, truth_kind: int, filter_kind: int, varied: bool) -> Any:
-    """Compile the step of all rows (see above for its length)."""
-    behind_filter_model = field.TABLE + (packing.FILTER_SIZE * LANES if filter_kind == packing.TIME_VARYING else 0)
+    """Compile the step of all rows."""
+    behind_filter_model = field.TABLE + (unpacking.FILTER_SIZE * LANES if filter_kind == packing.TIME_VARYING else 0)
     constant_truth, constant_filter = truth_kind == packing.TIME_INVARIANT, filter_kind == packing.TIME_INVARIANT
     # Rows of different variants have models of their own, as rows at different steps have where models vary.
     one_truth, one_filter_model = constant_truth and not varied, constant_filter and not varied
@@ -89,7 +90,7 @@ def _step(source_hash: int, truth_kind: int, filter_kind: int, varied: bool) -> 
         if varied:
             true_dynamics, model, process, sensor, forces, settings = variants.nothing_shared()
         else:
-            true_dynamics, model, process, sensor, forces, settings = packing.unpack(packed[0])
+            true_dynamics, model, process, sensor, forces, settings = unpacking.unpack(packed[0])
         known_step = -1
         for index in range(len(states)):
             used = min(len(width), len(actions) - index * LANES)
@@ -139,7 +140,7 @@ def _reset(source_hash: int, varied: bool) -> Any:
         if varied:
             _, _, _, sensor, _, settings = variants.nothing_shared()
         else:
-            _, _, _, sensor, _, settings = packing.unpack(packed[0])
+            _, _, _, sensor, _, settings = unpacking.unpack(packed[0])
         for first in range(0, len(rows), len(width)):
             memory.gather(tile, width, states, rows, first)
             if varied:

@@ -7,7 +7,7 @@ with a name can be read from outside, by `Simulation.read`.
 
 from typing import Final, NamedTuple
 
-from formation_env.kernel import packing
+from formation_env.kernel import unpacking
 from formation_env.numerics.jit import LANES
 from formation_env.task import observation, schedule
 
@@ -102,7 +102,7 @@ PUSH: Final = _field(size=3)  # thrust plus random acceleration along LVLH, m/s^
 RELATIVE: Final = _field(size=6)  # position and velocity relative to the leader along inertial axes
 BEFORE: Final = _field(size=6)  # RELATIVE at the substep's start
 RATES: Final = _field(size=42)  # of each stage
-SETTINGS: Final = _field(size=packing.SIZE)  # of the row's variant, if there are several
+SETTINGS: Final = _field(size=unpacking.SIZE)  # of the row's variant, if there are several
 TABLE: Final = _next_field * LANES  # the row's varying models, last since their number varies (`packing.step_table`)
 TILE_FIELDS: Final = _next_field
 

@@ -8,10 +8,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from formation_env.kernel import packing
 from formation_env.kernel import tile as field
-from formation_env.kernel.packing import Forces, Scalars, SensorNoise
+from formation_env.kernel import unpacking
 from formation_env.kernel.tile import Width
+from formation_env.kernel.unpacking import Forces, Scalars, SensorNoise
 from formation_env.numerics import random_streams
 from formation_env.numerics.arrays import Array
 from formation_env.numerics.fastmath import to_bits, to_integer
@@ -20,14 +20,14 @@ from formation_env.task.schedule import WIDTH
 
 TRUTH: Final = field.SETTINGS
 """Offset of the rows' true models in the tile, if they are time-invariant."""
-FILTER: Final = field.SETTINGS + packing.FILTER * LANES
+FILTER: Final = field.SETTINGS + unpacking.FILTER * LANES
 """Offset of the filter's models and process noises, if they are time-invariant."""
 _COUNTER: Final = np.uint64(6)  # the first block of step 0 that neither a step nor a reset uses
 
 
 @inline_scalar
 def nothing_shared() -> Any:
-    """Stand in for `packing.unpack` where no settings are shared by all rows."""
+    """Stand in for `unpacking.unpack` where no settings are shared by all rows."""
     return None, None, None, None, None, None
 
 
@@ -35,7 +35,7 @@ def nothing_shared() -> Any:
 def own_scalars(tile: Array, i: int, shared: Scalars | None) -> Scalars:
     """The numbers of row i's settings."""
     if shared is None:
-        return packing.unpack_scalars(tile, field.SETTINGS + i, LANES)
+        return unpacking.unpack_scalars(tile, field.SETTINGS + i, LANES)
     return shared
 
 
@@ -43,7 +43,7 @@ def own_scalars(tile: Array, i: int, shared: Scalars | None) -> Scalars:
 def own_sensor(tile: Array, i: int, shared: SensorNoise | None) -> SensorNoise:
     """The filter's sensor model of row i."""
     if shared is None:
-        return packing.unpack_sensor(tile, field.SETTINGS + i, LANES)
+        return unpacking.unpack_sensor(tile, field.SETTINGS + i, LANES)
     return shared
 
 
@@ -51,7 +51,7 @@ def own_sensor(tile: Array, i: int, shared: SensorNoise | None) -> SensorNoise:
 def own_forces(tile: Array, i: int, shared: Forces | None) -> Forces:
     """Forces on row i in the nonlinear truth."""
     if shared is None:
-        return packing.unpack_forces(tile, field.SETTINGS + i, LANES)
+        return unpacking.unpack_forces(tile, field.SETTINGS + i, LANES)
     return shared
 
 
@@ -95,10 +95,10 @@ def read(tile: Array, width: Width, schedule: Array, packed: Array) -> None:
     own, now = np.empty(LANES, np.intp), np.empty(LANES, np.intp)
     for i in range(len(width)):
         variant = int(tile[field.VARIANT + i])
-        own[i] = variant * packing.SIZE
+        own[i] = variant * unpacking.SIZE
         now[i] = (variant * steps + min(int(tile[field.STEP + i]), steps - 1)) * columns
     numbers, plans = packed.reshape(-1), schedule.reshape(-1)
-    for k in range(packing.SIZE):
+    for k in range(unpacking.SIZE):
         for i in range(len(width)):
             tile[field.SETTINGS + k * LANES + i] = numbers[own[i] + k]
     for k in range(columns):

@@ -1,12 +1,12 @@
 """The Kalman filter of a row of a tile (see `kalman`)."""
 
-from formation_env.kernel import kalman, packing
+from formation_env.kernel import kalman
 from formation_env.kernel import tile as field
-from formation_env.kernel.packing import Model, ProcessNoise, Scalars, SensorNoise
 from formation_env.kernel.stages.linear_model import propagate, read_model, read_process
 from formation_env.kernel.stages.link import dropout
 from formation_env.kernel.stages.noise import FIRST_SENSOR_NOISE
 from formation_env.kernel.tile import Width
+from formation_env.kernel.unpacking import Model, ProcessNoise, Scalars, SensorNoise
 from formation_env.kernel.variants import own_scalars, own_sensor
 from formation_env.numerics.arrays import Array
 from formation_env.numerics.jit import LANES, inline_scalar, tile_function
@@ -100,16 +100,14 @@ def _store_10(tile: Array, k: int, P: kalman.Symmetric4) -> None:
 
 
 @tile_function
-def predict(
-    tile: Array, width: Width, model: packing.Model, noise: packing.ProcessNoise, settings: packing.Scalars
-) -> None:
+def predict(tile: Array, width: Width, model: Model, noise: ProcessNoise, settings: Scalars) -> None:
     """The filter's time update, by one model."""
     for i in range(len(width)):
         filter_time_update(tile, i, model, noise, settings)
 
 
 @tile_function
-def predict_varying(tile: Array, width: Width, table: int, settings: packing.Scalars | None) -> None:
+def predict_varying(tile: Array, width: Width, table: int, settings: Scalars | None) -> None:
     """Update in time by the model of the row, which stands in the tile at `table`."""
     for i in range(len(width)):
         model, noise = read_model(tile, i, table), read_process(tile, i, table)
@@ -117,7 +115,7 @@ def predict_varying(tile: Array, width: Width, table: int, settings: packing.Sca
 
 
 @tile_function
-def measure(tile: Array, width: Width, sensor: packing.SensorNoise | None, settings: packing.Scalars | None) -> None:
+def measure(tile: Array, width: Width, sensor: SensorNoise | None, settings: Scalars | None) -> None:
     """Measurement and the filter's measurement update."""
     for i in range(len(width)):
         dropout(tile, i, own_scalars(tile, i, settings))

@@ -1,6 +1,6 @@
 """A step of a linear model, and models that a row's plan holds."""
 
-from formation_env.kernel.packing import Model, ProcessNoise, unpack_model, unpack_process
+from formation_env.kernel.unpacking import Model, ProcessNoise, unpack_model, unpack_process
 from formation_env.numerics.arrays import Array
 from formation_env.numerics.jit import LANES, inline_scalar
 

@@ -3,8 +3,8 @@
 from typing import Final
 
 from formation_env.kernel import tile as field
-from formation_env.kernel.packing import Scalars
 from formation_env.kernel.stages.noise import LINK_UNIFORM
+from formation_env.kernel.unpacking import Scalars
 from formation_env.numerics.arrays import Array
 from formation_env.numerics.jit import inline_scalar
 

@@ -4,11 +4,10 @@ from typing import Final
 
 import numpy as np
 
-from formation_env.kernel import packing
 from formation_env.kernel import tile as field
-from formation_env.kernel.packing import Scalars
 from formation_env.kernel.stages.reward import PHASE
 from formation_env.kernel.tile import Width
+from formation_env.kernel.unpacking import Scalars
 from formation_env.kernel.variants import own_scalars
 from formation_env.numerics.arrays import Array
 from formation_env.numerics.fastmath import log
@@ -126,7 +125,7 @@ def observe_rest(tile: Array, i: int, settings: Scalars) -> None:
 
 
 @tile_function
-def observe(tile: Array, width: Width, settings: packing.Scalars | None) -> None:
+def observe(tile: Array, width: Width, settings: Scalars | None) -> None:
     """Compute the observation of each row."""
     for axis in range(6):
         for i in range(len(width)):

@@ -4,10 +4,9 @@ from typing import Final
 
 import numpy as np
 
-from formation_env.kernel import packing
 from formation_env.kernel import tile as field
-from formation_env.kernel.packing import Scalars
 from formation_env.kernel.tile import Width
+from formation_env.kernel.unpacking import Scalars
 from formation_env.kernel.variants import own_scalars
 from formation_env.numerics.arrays import Array
 from formation_env.numerics.jit import LANES, inline_scalar, tile_function
@@ -67,7 +66,7 @@ def totals(tile: Array, i: int, settings: Scalars) -> None:
 
 
 @tile_function
-def score(tile: Array, width: Width, settings: packing.Scalars | None) -> None:
+def score(tile: Array, width: Width, settings: Scalars | None) -> None:
     """Reward, end of the episode and totals."""
     for i in range(len(width)):
         reward_and_end(tile, i, own_scalars(tile, i, settings))

@@ -1,10 +1,9 @@
 """The start of an episode."""
 
-from formation_env.kernel import packing
 from formation_env.kernel import tile as field
-from formation_env.kernel.packing import Scalars
 from formation_env.kernel.stages.noise import LINK_UNIFORM
 from formation_env.kernel.tile import Width
+from formation_env.kernel.unpacking import Scalars
 from formation_env.kernel.variants import own_scalars
 from formation_env.numerics.arrays import Array
 from formation_env.numerics.jit import LANES, inline_scalar, tile_function
@@ -55,7 +54,7 @@ def place(tile: Array, width: Width, starts: Array, given: bool, first: int) -> 
 
 
 @tile_function
-def begin(tile: Array, width: Width, given: bool, settings: packing.Scalars | None) -> None:
+def begin(tile: Array, width: Width, given: bool, settings: Scalars | None) -> None:
     """Start an episode in each row."""
     for i in range(len(width)):
         begin_row(tile, i, given, own_scalars(tile, i, settings))

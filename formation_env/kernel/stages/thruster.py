@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from formation_env.kernel import packing
 from formation_env.kernel import tile as field
-from formation_env.kernel.packing import Scalars
 from formation_env.kernel.stages.link import link
 from formation_env.kernel.stages.noise import THRUST_NOISE
 from formation_env.kernel.tile import Width
+from formation_env.kernel.unpacking import Scalars
 from formation_env.kernel.variants import own_scalars
 from formation_env.numerics.arrays import Array
 from formation_env.numerics.jit import LANES, inline_scalar, tile_function
@@ -36,7 +35,7 @@ def thruster(tile: Array, i: int, settings: Scalars) -> None:
 
 
 @tile_function
-def thrust(tile: Array, width: Width, settings: packing.Scalars | None) -> None:
+def thrust(tile: Array, width: Width, settings: Scalars | None) -> None:
     """Thruster and link."""
     for i in range(len(width)):
         thruster(tile, i, own_scalars(tile, i, settings))

@@ -6,10 +6,10 @@ import numpy as np
 
 from formation_env.dynamics.nonlinear import FAR_FIELDS, FAR_WIDTH, FIELDS, NEAR_WIDTH, NODES
 from formation_env.kernel import tile as field
-from formation_env.kernel.packing import Forces, Model, Scalars
 from formation_env.kernel.stages.linear_model import propagate, read_model
 from formation_env.kernel.stages.noise import FIRST_PROCESS_NOISE
 from formation_env.kernel.tile import Width
+from formation_env.kernel.unpacking import Forces, Model, Scalars
 from formation_env.kernel.variants import own_forces, own_scalars
 from formation_env.numerics.arrays import Array
 from formation_env.numerics.fastmath import exp, fma

@@ -15,7 +15,7 @@ from env_helpers import assert_same, random_actions
 import formation_env
 from formation_env import FormationVectorEnv, load_scenario, scenario_names
 from formation_env.dynamics import NONLINEAR
-from formation_env.kernel import packing, program, tile
+from formation_env.kernel import packing, program, tile, unpacking
 from formation_env.kernel.simulation import Simulation
 from formation_env.navigation.filter_settings import KalmanFilter
 from formation_env.task.observation import SIZE
@@ -30,7 +30,7 @@ TREES = {
 @numba.njit
 def unpacked(settings):  # type: ignore[no-untyped-def]
     """All tuples that `unpack` gives, in the order in which `pack` writes them."""
-    return packing.unpack(settings)
+    return unpacking.unpack(settings)
 
 
 @pytest.mark.parametrize("name", scenario_names())
