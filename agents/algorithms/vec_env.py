@@ -26,7 +26,7 @@ class Sb3VecEnv(VecEnv):
     The info of a row is empty except at the end of its episode; then it has `terminal_observation`,
     `TimeLimit.truncated`, `episode` as SB3's Monitor gives it (return `r` in m/s as reported, without scaling or
     shaping; length `l`, seconds `t`), and `episode_totals` (metrics by name). The list of infos is reused from step to
-    step, and so is the dict of a row whose episode goes on: copy what shall be kept.
+    step, and so is the dict of a row whose episode goes on: copy what must survive the next step.
     """
 
     def __init__(

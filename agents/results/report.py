@@ -41,12 +41,12 @@ class Learned:
             if scenario in scenarios[:index]:
                 raise ConfigError(f"--model: {self.label}: {self.sources[index]} was trained on what another was, too")
 
-    def __call__(self, original: Scenario, believed: Scenario) -> Actor | None:
+    def __call__(self, original: Scenario, design: Scenario) -> Actor | None:
         """The policy for a scenario.
 
         Args:
             original: what it must have been trained on.
-            believed: makes no difference: it sees the observation alone.
+            design: unused; the policy sees the observation alone.
         """
         return next((actor for actor in map(_open, self.sources) if actor.scenario == original), None)
 
@@ -83,7 +83,7 @@ class UserModel:
     def __post_init__(self) -> None:
         _open_zip(self.path, self.throttle_power)
 
-    def __call__(self, original: Scenario, believed: Scenario) -> Policy:
+    def __call__(self, original: Scenario, design: Scenario) -> Policy:
         """The policy; the scenario makes no difference: it sees the observation alone."""
         return _open_zip(self.path, self.throttle_power)
 

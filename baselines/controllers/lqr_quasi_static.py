@@ -98,7 +98,7 @@ def _quasi_static(A: Array, B: Array, Q: Array, R: Array) -> tuple[Array, Array]
 
 
 def continuous_model(scenario: Scenario) -> tuple[Array, Array]:
-    """A (6, 6), or (num_steps, 6, 6) if it varies, and B (6, 3) that the filter believes."""
+    """A (6, 6), or (num_steps, 6, 6) if it varies, and B (6, 3) of the filter's model."""
     filter_model = scenario.filter_model
     times_s = scenario.dt_s * np.arange(scenario.num_steps)
     return get_dynamics(filter_model.dynamics).state_matrix(

@@ -29,12 +29,12 @@ class PolicyFactory(Protocol):
     plain data, or None if it has no policy. Then the report shows them, and its episodes can be cached.
     """
 
-    def __call__(self, original: Scenario, believed: Scenario, /) -> Policy | None:
-        """A policy designed for the believed scenario, or None if there is none.
+    def __call__(self, original: Scenario, design: Scenario, /) -> Policy | None:
+        """A policy for the design scenario, or None if there is none.
 
         Args:
             original: the scenario whose settings or training the policy has.
-            believed: the scenario it is designed for; it differs from the original only in a sweep.
+            design: the scenario it is designed for; it differs from the original only in a sweep.
         """
         ...
 
@@ -57,9 +57,9 @@ class Classical:
     def __post_init__(self) -> None:
         policy_class(self.name)
 
-    def __call__(self, original: Scenario, believed: Scenario) -> AccelerationPolicy:
-        """The policy for the believed scenario."""
-        return make_policy(self.name, believed, self.settings(original))
+    def __call__(self, original: Scenario, design: Scenario) -> AccelerationPolicy:
+        """The policy for the design scenario."""
+        return make_policy(self.name, design, self.settings(original))
 
     def settings(self, original: Scenario) -> Any:
         """Its settings.

@@ -43,7 +43,7 @@ class Point:
         env: name of the environment.
         places: quantities and their values that make it; the scenario's own value of several is one point.
         flown: the scenario that is simulated.
-        believed: the scenario that policies are designed for.
+        design: the scenario that policies are designed for.
         original: the scenario that was varied; policies have its settings throughout.
         policies: label -> factory.
         seeds: one per episode.
@@ -53,7 +53,7 @@ class Point:
     env: str
     places: tuple[tuple[str, float], ...]
     flown: Scenario
-    believed: Scenario
+    design: Scenario
     original: Scenario
     policies: Mapping[str, PolicyFactory]
     seeds: tuple[int, ...]
@@ -68,7 +68,7 @@ class Point:
     def key(self) -> Any:
         """Cache key (compared by repr); None, where a policy does not give its settings, disables caching."""
         settings = {name: cache_key(factory, self.original) for name, factory in self.policies.items()}
-        place = (self.env, self.places, self.flown, self.believed)
+        place = (self.env, self.places, self.flown, self.design)
         return None if None in settings.values() else (*place, settings, self.seeds, self.bound_seeds)
 
     def run(self, progress: Progress) -> pd.DataFrame:
@@ -85,7 +85,7 @@ class Point:
         """
         tables = []
         for name, factory in self.policies.items():
-            policy = factory(self.original, self.believed)
+            policy = factory(self.original, self.design)
             if policy is not None:
                 tables.append(self._fly(name, policy))
             progress(self.flown.num_steps)
@@ -151,14 +151,14 @@ def points(
             raise ConfigError(f"sweep: {env}: reward.error_weight: must be > 0 for a trade-off, got 0")
         solved = tuple(seeds)[:bound_episodes] if scenario.dynamics != NONLINEAR else ()
         places: dict[tuple[Scenario, Scenario], list[tuple[str, float]]] = {}
-        for quantity, value, flown, believed in _varied(env, scenario, coarse):
-            places.setdefault((flown, believed), []).append((quantity, value))
-        for (flown, believed), own in places.items():
+        for quantity, value, flown, design in _varied(env, scenario, coarse):
+            places.setdefault((flown, design), []).append((quantity, value))
+        for (flown, design), own in places.items():
             jobs[f"{env} {own[0][0]} {own[0][1]:g}"] = Point(
                 env=env,
                 places=tuple(own),
                 flown=flown,
-                believed=believed,
+                design=design,
                 original=scenario,
                 policies=policies,
                 seeds=tuple(seeds),
@@ -171,10 +171,10 @@ def _varied(env: str, scenario: Scenario, coarse: bool) -> Iterator[tuple[str, f
     for quantity, variation in VARIATIONS.items():
         for value in variation.few if coarse else variation.values:
             try:
-                flown, believed = variation.vary(scenario, value)
+                flown, design = variation.vary(scenario, value)
             except ConfigError as error:
                 raise ConfigError(f"sweep: {env}: {quantity} = {value:g}: {faults_of(error)}") from None
-            yield quantity, value, flown, believed
+            yield quantity, value, flown, design
 
 
 @dataclass(frozen=True)

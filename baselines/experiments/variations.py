@@ -101,8 +101,8 @@ def ballistic_coefficient(scenario: Scenario, percent: float) -> Pair:
     """The follower's ballistic coefficient m / (C_d S) off by by some per cent; leader and filter are unchanged."""
     known = scenario.spacecraft
     true = replace(known, area_m2=known.area_m2 / (1 + percent / 100))
-    believed = replace(scenario.filter, spacecraft=scenario.filter_model.spacecraft)
-    return replace(scenario, spacecraft=true, leader_spacecraft=scenario.leader, filter=believed), scenario
+    filter_settings = replace(scenario.filter, spacecraft=scenario.filter_model.spacecraft)
+    return replace(scenario, spacecraft=true, leader_spacecraft=scenario.leader, filter=filter_settings), scenario
 
 
 def thrust_magnitude(scenario: Scenario, percent: float) -> Pair:

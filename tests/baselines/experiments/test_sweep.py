@@ -80,9 +80,9 @@ def test_a_variation_changes_what_it_says_and_nothing_else(quantity: str) -> Non
     """Field by field against the shipped scenario; the policy's scenario is the flown or the original one."""
     original, variation = load_scenario("keeping"), VARIATIONS[quantity]
     for value in (variation.values[0], variation.values[-1]):
-        flown, believed = variation.vary(original, value)
+        flown, design = variation.vary(original, value)
         assert changed(original, flown) <= CHANGES[quantity]
-        assert believed == (flown if quantity in TOLD else original)
+        assert design == (flown if quantity in TOLD else original)
     assert changed(original, flown) == CHANGES[quantity]
 
 
@@ -114,7 +114,7 @@ def test_a_quick_look_has_ends_and_middle() -> None:
 def test_the_scenario_itself_is_flown_once() -> None:
     """Quantities whose own value leaves the scenario as it is share a point, and all of them show it."""
     made = points({"keeping": load_scenario("keeping")}, POLICIES, (0,), 0)
-    own = [point for point in made.values() if point.flown == point.believed == point.original]
+    own = [point for point in made.values() if point.flown == point.design == point.original]
     (point,) = own
     assert {quantity for quantity, _ in point.places} >= TOLD | {"thrust_magnitude"}
     places = [place for point in made.values() for place in point.places]
@@ -143,19 +143,19 @@ def test_a_wrong_ballistic_coefficient_is_hidden_from_the_filter() -> None:
     craft, v = scenario.spacecraft, scenario.orbit.speed_m_s
     inverse = craft.drag_coefficient * craft.area_m2 / craft.mass_kg
     push_m_s2 = -0.5 * craft.air_density_kg_m3 * v**2 * (inverse / 1.5 - inverse)
-    true, believed = flown.true_dynamics(), flown.filter_dynamics()
+    true, design = flown.true_dynamics(), flown.filter_dynamics()
     # along-track velocity gained in one 30 s step; coupling into it is of the order (n dt)^2 = 1e-3
     assert true.delta[4] == pytest.approx(push_m_s2 * scenario.dt_s, rel=5e-3)
-    assert np.abs(believed.delta).max() == 0
-    np.testing.assert_array_equal(believed.Phi, scenario.filter_dynamics().Phi)
+    assert np.abs(design.delta).max() == 0
+    np.testing.assert_array_equal(design.Phi, scenario.filter_dynamics().Phi)
 
 
 def test_a_stronger_thruster_thrusts_more_than_commanded() -> None:
     """+10 %: what acts is 1.1 times what the policy commands, on the first step, where both know the same."""
     scenario = load_scenario("initialization")
-    flown, believed = VARIATIONS["thrust_magnitude"].vary(scenario, 10.0)
+    flown, design = VARIATIONS["thrust_magnitude"].vary(scenario, 10.0)
     axes = ["ax_m_s2", "ay_m_s2", "az_m_s2"]
-    policy = make_policy("lqr", believed)
+    policy = make_policy("lqr", design)
     acted, commanded = (record(policy, which, 0)[axes].iloc[1].to_numpy() for which in (flown, scenario))
     # actions are single precision
     np.testing.assert_allclose(acted, 1.1 * commanded, rtol=1e-6, atol=1e-12)
@@ -220,8 +220,8 @@ def test_the_mean_error_is_the_environments() -> None:
 def test_gains_are_those_of_the_original() -> None:
     """A varied scenario equals no shipped one; it must not fall back to the default gains."""
     scenario = load_scenario("keeping")
-    flown, believed = VARIATIONS["outage_length"].vary(scenario, 60.0)
-    point = Point("keeping", (("outage_length", 60.0),), flown, believed, scenario, {"smc": Classical("smc")}, (0,))
+    flown, design = VARIATIONS["outage_length"].vary(scenario, 60.0)
+    point = Point("keeping", (("outage_length", 60.0),), flown, design, scenario, {"smc": Classical("smc")}, (0,))
     table = point.run(lambda _: None)
     own = evaluate(make_policy("smc", "keeping"), flown, [0])
     assert table["cost_m_s"].iloc[0] == -own["return"].iloc[0]

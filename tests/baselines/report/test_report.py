@@ -45,15 +45,15 @@ SHORT = {
 }
 
 
-def zero(original: Scenario, believed: Scenario) -> Zero:
-    return Zero(believed, ZeroSettings())
+def zero(original: Scenario, design: Scenario) -> Zero:
+    return Zero(design, ZeroSettings())
 
 
-def random(original: Scenario, believed: Scenario) -> Random:
-    return Random(believed, RandomSettings())
+def random(original: Scenario, design: Scenario) -> Random:
+    return Random(design, RandomSettings())
 
 
-def only_short(original: Scenario, believed: Scenario) -> Zero | None:
+def only_short(original: Scenario, design: Scenario) -> Zero | None:
     return zero(original, original) if len(original.phases) == 2 else None
 
 
@@ -281,7 +281,7 @@ def test_a_failure_leaves_the_old_files(folder: Path, tmp_path: Path) -> None:
             raise RuntimeError("in mid-flight")
 
     (tmp_path / "report.html").write_text("old")
-    policies = {"zero": zero, "failing": lambda original, believed: Failing(believed, ZeroSettings())}
+    policies = {"zero": zero, "failing": lambda original, design: Failing(design, ZeroSettings())}
     with pytest.raises(RuntimeError, match="in mid-flight"):
         write_report(policies, short_scenarios(), OPTIONS, tmp_path, COMMAND)
     assert {path.name for path in tmp_path.iterdir()} <= {"report.html", "bounds"}
@@ -320,7 +320,7 @@ def test_wrong_environments_are_named(tmp_path: Path, envs: list[str], message: 
 def test_an_environment_without_policy_is_refused(tmp_path: Path) -> None:
     """A report without a line says nothing."""
     with pytest.raises(ConfigError, match="no policy for keeping_nonlinear"):
-        write_report({"none": lambda original, believed: None}, ["keeping_nonlinear"], OPTIONS, tmp_path, COMMAND)
+        write_report({"none": lambda original, design: None}, ["keeping_nonlinear"], OPTIONS, tmp_path, COMMAND)
     assert not list(tmp_path.iterdir())
 
 
@@ -512,7 +512,7 @@ def test_a_spreadsheet_runs_nothing() -> None:
 def test_a_folder_that_cannot_be_written_is_found_first(tmp_path: Path) -> None:
     """Nothing is flown before."""
 
-    def never(original: Scenario, believed: Scenario) -> Zero:
+    def never(original: Scenario, design: Scenario) -> Zero:
         raise AssertionError("flown")
 
     blocked = tmp_path / "file"
