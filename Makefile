@@ -22,7 +22,7 @@ COMPILED  := tests/formation_env/numerics tests/formation_env/kernel/test_kalman
 INSTALL = $(PY) -m pip install --quiet -c constraints.txt -e
 
 .DEFAULT_GOAL := help
-.PHONY: help report report-full thesis test test-portable check bench clean
+.PHONY: help report report-full results thesis test test-portable check bench clean
 .NOTPARALLEL:
 .DELETE_ON_ERROR:
 
@@ -35,6 +35,9 @@ report: $(REPORT) ## Learned and classical policies on the four environments (EP
 report-full: $(REPORT) ## The same with all seeds for mpc and finer fronts; continues after an interrupt
 	$(PY) -m agents report --episodes $(EPISODES) --slow-episodes $(EPISODES) --sweep-episodes 50 --bound-episodes 20 \
 		--fine --resume --out $(OUT)
+
+results: report ## The report's tables into docs/results.md and README.md
+	$(PY) docs/update_results.py $(OUT)
 
 thesis: $(REPORT) ## The source thesis's figures and claims, reproduced (OUT=reports/): OUT/thesis/thesis.html
 	$(PY) -m baselines thesis --out $(patsubst %/,%,$(OUT))/thesis $(ARGS)

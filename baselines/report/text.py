@@ -146,8 +146,7 @@ def number(value: float) -> str:
     """A number with three significant digits, thousands with a comma; a dash if it is not finite."""
     if not np.isfinite(value):
         return "–"
-    text = f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}"
-    return text.replace("-", "−")
+    return _minus(f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}")
 
 
 def numbers(interval: Interval, factor: float = 1.0) -> Cells:

@@ -17,6 +17,7 @@ import pytest
 import typer
 from ruamel.yaml import YAML
 
+from baselines.report.results_page import results_page
 from formation_env import ENV_IDS, Scenario, load_scenario, scenario_names
 from formation_env.dropout import DROPOUTS
 from formation_env.evaluation import evaluate
@@ -258,11 +259,15 @@ def tables(text: str) -> list[str]:
 
 
 def test_results_stand_once() -> None:
-    """README's table is the first one of docs/results.md, which `make report` writes; no other page has these rows."""
+    """README's table is the first one of docs/results.md, which `make results` writes; no other page has these rows."""
     (block,) = re.findall(r"<!-- results:begin -->\n(.*?)<!-- results:end -->", PAGES["README.md"], re.DOTALL)
     first = tables(PAGES["docs/results.md"])[0]
     assert block == first
-    assert "Made by `make report`" in PAGES["docs/results.md"]
+    assert re.search(
+        r"^Made by `.*agents report --episodes 100 .*`; do not edit", PAGES["docs/results.md"], re.MULTILINE
+    )
+    headings = re.findall(r"^## .*", PAGES["docs/results.md"], re.MULTILINE)
+    assert headings == [*re.findall(r"^## .*", results_page([]), re.MULTILINE), "## Learned policies"]
     rows = {row for row in first.splitlines() if "[" in row}
     for page in PAGES.keys() - {"README.md", "docs/results.md"}:
         assert not rows & set(PAGES[page].splitlines())
