@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from baselines.design.phase_tables import nominal_start
 from formation_env.dynamics import NONLINEAR
 from formation_env.envs import FormationEnv
-from formation_env.envs.interface import INFO_THRUST
 from formation_env.numerics.arrays import Array
 from formation_env.task.reward import ErrorCost
 from formation_env.task.scenario import Limits, Scenario
@@ -126,20 +125,14 @@ def _coast(scenario: Scenario, start: Array) -> Array:
 def _episode(scenario: Scenario, seed: int) -> tuple[Array, Array]:
     """An episode's states (steps + 1, 6) without thrust, and the gain (steps,) of its thruster in each step.
 
-    The environment draws its noises by seed and step, whatever the actions are: one flight without thrust shows what
-    the process noise does, another at full thrust what the thruster's error is.
+    The environment draws its noises by seed and step, whatever the actions are: the path of a flight without thrust
+    contains the process noise, and its infos give the thruster's error.
     """
-    env = FormationEnv(replace(scenario, limits=Limits(max_distance_m=_FAR_M)))
-    path, _ = _fly(env, seed, 0.0)
-    _, thrust = _fly(env, seed, 1.0)
-    return path, thrust[:, 0] / scenario.spacecraft.max_accel_m_s2
-
-
-def _fly(env: FormationEnv, seed: int, action: float) -> tuple[Array, Array]:
-    """True states (steps + 1, 6) and accelerations (steps, 3) of an episode under the same action on all axes."""
+    env = FormationEnv(replace(scenario, limits=Limits(max_distance_m=_FAR_M)), analysis=True)
     infos = [env.reset(seed=seed)[1]]
-    infos += [env.step(np.full(3, action, np.float32))[4] for _ in range(env.scenario.num_steps)]
-    return np.array([info["true_state"] for info in infos]), np.array([info[INFO_THRUST] for info in infos[1:]])
+    infos += [env.step(np.zeros(3, np.float32))[4] for _ in range(scenario.num_steps)]
+    path = np.array([info["true_state"] for info in infos])
+    return path, 1 + np.array([info["thrust_noise"] for info in infos[1:]])
 
 
 def _scores(scenario: Scenario) -> tuple[Array, Array]:
