@@ -170,7 +170,7 @@ def column(intervals: Sequence[Interval | None], factor: float = 1.0) -> list[Ce
 
 
 def _decimals(interval: Interval, factor: float) -> int:
-    """Decimals for two digits of the interval's width, but at most four digits of the mean."""
+    """Decimals for two digits of the interval's width, and three or four of the mean, so that ranks can be read."""
     mean, low, high = (abs(factor) * value for value in interval)
     width = abs(high - low)
     size = max(abs(mean), width)
@@ -178,7 +178,8 @@ def _decimals(interval: Interval, factor: float) -> int:
         return 0
     digits = 3 - math.floor(math.log10(size))
     by_width = 1 - math.floor(math.log10(width)) if width > 0 else digits
-    return max(0, min(digits, by_width, MAX_DECIMALS))
+    by_mean = 2 - math.floor(math.log10(mean)) if mean > 0 else by_width
+    return max(0, min(digits, max(by_width, by_mean), MAX_DECIMALS))
 
 
 def _fixed(interval: Interval, factor: float, decimals: int) -> Cells:
