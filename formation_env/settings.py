@@ -17,9 +17,9 @@ from pydantic.dataclasses import dataclass as pydantic_dataclass
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import ArgsKwargs, CoreSchema, ErrorDetails, PydanticCustomError, core_schema
 
-from formation_env.config_files import ConfigError, load_json, load_yaml
-from formation_env.docstrings import describe_keys
-from formation_env.short_values import MAX_VALUE_LENGTH, shortened
+from formation_env.configuration.config_files import ConfigError, load_json, load_yaml
+from formation_env.configuration.docstrings import describe_keys
+from formation_env.configuration.short_values import MAX_VALUE_LENGTH, shortened
 
 __all__ = [
     "ConfigError",

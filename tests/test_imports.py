@@ -18,15 +18,12 @@ LAYERS = {
     "formation_env": (
         {
             "numerics",
-            "config_files",
-            "docstrings",
+            "configuration",
             "files",
             "lazy",
             "quantities",
             "registration",
             "settings",
-            "short_values",
-            "yaml_loader",
             "rendering.modes",
         },
         {"orbital"},
@@ -163,7 +160,7 @@ def test_the_sources_are_read() -> None:
     assert {package(name) for name in FILES} == set(PACKAGES)
     seen = {(found.source, found.target, found.lazy) for found in IMPORTS}
     assert ("formation_env.kernel.stages.kalman_filter", "formation_env.kernel.kalman", False) in seen
-    assert ("formation_env.config_files", "formation_env.yaml_loader", True) in seen
+    assert ("formation_env.configuration.config_files", "formation_env.configuration.yaml_loader", True) in seen
 
 
 def test_packages_import_one_way() -> None:

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from pydantic import TypeAdapter
 
-from formation_env.docstrings import attributes
+from formation_env.configuration.docstrings import attributes
 from formation_env.dropout import DROPOUTS
 from formation_env.dynamics import DYNAMICS, NONLINEAR
 from formation_env.formations import FORMATIONS

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from formation_env.config_files import MAX_CONFIG_BYTES, ConfigError, load_json, load_yaml
-from formation_env.yaml_loader import MAX_DEPTH
+from formation_env.configuration.config_files import MAX_CONFIG_BYTES, ConfigError, load_json, load_yaml
+from formation_env.configuration.yaml_loader import MAX_DEPTH
 
 PATIENCE_S = 20.0
 """Far above what a refusal takes, and far below what the same file once took."""

@@ -22,7 +22,7 @@ def load_yaml(path: Path) -> Any:
     """
     from ruamel.yaml.error import YAMLError
 
-    from formation_env import yaml_loader
+    from formation_env.configuration import yaml_loader
 
     try:
         return yaml_loader.load(_read(path, "YAML"))
