@@ -10,6 +10,7 @@ say how it is trained. `agents.algorithms.registry` lists them.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from importlib import import_module
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Literal
 
@@ -114,6 +115,8 @@ class CommonSettings:
         pretraining: settings of the pretraining; none if left out.
     """
 
+    learner: ClassVar[str] = ""
+    """Module whose `make_model(settings, env, seed)` builds the learner; it needs torch, so it is imported on use."""
     stagger_starts: ClassVar[bool] = False
     """Whether the rows' episodes begin spread over an episode's length, so that a rollout sees every phase."""
     search_space: ClassVar[Mapping[str, SearchRange]] = MappingProxyType({})
@@ -136,7 +139,10 @@ class CommonSettings:
 
     def make_model(self, env: "VecEnv", seed: int) -> "BaseAlgorithm":
         """Build a Stable-Baselines3 model on `env`; `seed` determines initial weights and exploration."""
-        raise NotImplementedError(f"{type(self).__name__}: give it make_model")
+        if not self.learner:
+            raise NotImplementedError(f"{type(self).__name__}: give it make_model, or the name of its learner's module")
+        model: BaseAlgorithm = import_module(self.learner).make_model(self, env, seed)
+        return model
 
     def check_scenario(self, scenario: Scenario) -> None:
         """Refuse a scenario that the hyperparameters cannot train on.

@@ -10,8 +10,7 @@ from agents.hyperparameters import CommonSettings, NonNegativeInt, PositiveInt, 
 from formation_env.settings import NonNegative, Positive, Probability, Real, settings
 
 if TYPE_CHECKING:
-    from stable_baselines3.common.base_class import BaseAlgorithm
-    from stable_baselines3.common.vec_env import VecEnv
+    pass
 
 
 @settings
@@ -34,6 +33,7 @@ class PPOSettings(CommonSettings):
         warmup_rollouts: rollouts whose updates train the critic alone, so that it does not spoil a pretrained actor.
     """
 
+    learner: ClassVar[str] = "agents.algorithms.ppo_learner"
     stagger_starts: ClassVar[bool] = True
     search_space: ClassVar[Mapping[str, SearchRange]] = MappingProxyType(
         {
@@ -67,9 +67,3 @@ class PPOSettings(CommonSettings):
         if samples % self.batch_size:
             raise ValueError(f"batch_size: must divide rows * rollout_steps = {samples}, got {self.batch_size}")
         return self
-
-    def make_model(self, env: "VecEnv", seed: int) -> "BaseAlgorithm":
-        """Build PPO on `env`."""
-        from agents.algorithms.ppo_learner import make_ppo
-
-        return make_ppo(self, env, seed)

@@ -1,17 +1,14 @@
 """PPO for an actor that may already fly well."""
 
 import math
-from typing import TYPE_CHECKING
 
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.utils import LinearSchedule
 from stable_baselines3.common.vec_env import VecEnv
 
+from agents.algorithms.ppo import PPOSettings
 from agents.algorithms.throttle_policy import SquashedPolicy, policy_arguments
-
-if TYPE_CHECKING:
-    from agents.algorithms.ppo import PPOSettings
 
 
 class CriticFirstPPO(PPO):
@@ -35,7 +32,7 @@ class CriticFirstPPO(PPO):
             policy.log_std.clamp_(min=self.log_std_min)
 
 
-def make_ppo(settings: "PPOSettings", env: VecEnv, seed: int) -> PPO:
+def make_model(settings: PPOSettings, env: VecEnv, seed: int) -> PPO:
     """Build the learner; `seed` determines initial weights and exploration."""
     model = CriticFirstPPO(
         SquashedPolicy,

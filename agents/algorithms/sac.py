@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self, cast
 
 from pydantic import model_validator
 
@@ -20,7 +20,6 @@ from formation_env.task.scenario import Scenario
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
-    from stable_baselines3.common.vec_env import VecEnv
 
 
 @settings(renamed={"share": "probability", "low": "sigma_min", "high": "sigma_max"})
@@ -72,6 +71,7 @@ class SACSettings(CommonSettings):
         exploration_impulses: impulses added to the throttles that are flown; none if left out.
     """
 
+    learner: ClassVar[str] = "agents.algorithms.sac_learner"
     search_space: ClassVar[Mapping[str, SearchRange]] = MappingProxyType(
         {
             "learning_rate": SearchRange(3e-6, 1e-3),
@@ -118,15 +118,6 @@ class SACSettings(CommonSettings):
         if scenario.domain_randomization and self.after_state:
             raise ValueError("agent.after_state: must be false for a scenario with domain_randomization, got true")
 
-    def make_model(self, env: "VecEnv", seed: int) -> "BaseAlgorithm":
-        """Build SAC on `env`."""
-        from agents.algorithms.sac_learner import make_sac
-
-        return make_sac(self, env, seed)
-
     def on_warm_start(self, model: "BaseAlgorithm") -> None:
         """Regularise towards the pretrained actor."""
-        from agents.algorithms.sac_learner import CriticFirstSAC
-
-        assert isinstance(model, CriticFirstSAC), "make_model gave it"
-        model.regularise_towards_current_actor()
+        cast(Any, model).regularise_towards_current_actor()  # the learner's own method

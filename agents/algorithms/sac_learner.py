@@ -1,7 +1,7 @@
 """SAC fine-tuning of a pretrained actor."""
 
 import copy
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
@@ -15,11 +15,9 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from agents.algorithms.afterstate_critic import AfterStatePolicy, ThrustCost
+from agents.algorithms.sac import SACSettings
 from agents.algorithms.throttle_policy import ThrottleSACPolicy, policy_arguments
 from agents.algorithms.vec_env import batched_env
-
-if TYPE_CHECKING:
-    from agents.algorithms.sac import SACSettings
 
 
 class CriticFirstSAC(SAC):
@@ -36,7 +34,7 @@ class CriticFirstSAC(SAC):
         behaviour: pretrained network from features to outputs; None after random initial weights.
     """
 
-    settings: "SACSettings"
+    settings: SACSettings
     random_start: bool = True
     behaviour: nn.Module | None = None
 
@@ -69,7 +67,7 @@ class CriticFirstSAC(SAC):
 
     def _set_actor_learning_rate(self, share_left: float) -> None:
         """Lower the learning rate of actor and temperature linearly to zero."""
-        assert self.ent_coef_optimizer is not None, "make_sac asks for a learnt temperature"
+        assert self.ent_coef_optimizer is not None, "make_model asks for a learnt temperature"
         for optimizer in (self.actor.optimizer, self.ent_coef_optimizer):
             update_learning_rate(optimizer, self.settings.actor_learning_rate * max(share_left, 0.0))
 
@@ -99,14 +97,14 @@ class CriticFirstSAC(SAC):
         penalty = self._behaviour_penalty(mean, data.observations)
         loss = (self._log_temperature.detach().exp() * log_prob - values + penalty).mean()
         _descend(self.actor.optimizer, loss)
-        assert self.ent_coef_optimizer is not None, "make_sac asks for a learnt temperature"
+        assert self.ent_coef_optimizer is not None, "make_model asks for a learnt temperature"
         entropy_gap = log_prob.detach() + self.settings.target_entropy
         _descend(self.ent_coef_optimizer, -(self._log_temperature * entropy_gap).mean())
         return loss.item()
 
     @property
     def _log_temperature(self) -> Tensor:
-        assert self.log_ent_coef is not None, "make_sac asks for a learnt temperature"
+        assert self.log_ent_coef is not None, "make_model asks for a learnt temperature"
         return self.log_ent_coef
 
     def _behaviour_penalty(self, mean: Tensor, observations: Tensor) -> Tensor:
@@ -137,7 +135,7 @@ class CriticFirstSAC(SAC):
         return [*super()._excluded_save_params(), "behaviour"]
 
 
-def make_sac(settings: "SACSettings", env: VecEnv, seed: int) -> SAC:
+def make_model(settings: SACSettings, env: VecEnv, seed: int) -> SAC:
     """Build the learner; `seed` determines initial weights and exploration."""
     model = CriticFirstSAC(
         AfterStatePolicy if settings.after_state else ThrottleSACPolicy,
@@ -167,7 +165,7 @@ def make_sac(settings: "SACSettings", env: VecEnv, seed: int) -> SAC:
     return model
 
 
-def _policy_arguments(settings: "SACSettings", env: VecEnv) -> dict[str, Any]:
+def _policy_arguments(settings: SACSettings, env: VecEnv) -> dict[str, Any]:
     """Arguments of the policy's constructor."""
     arguments = policy_arguments(settings)
     # SB3 clips the mean of gSDE at 2; unclipped, the actor in the file is the one that is trained.

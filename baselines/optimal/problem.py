@@ -13,8 +13,9 @@ from baselines.design.phase_tables import nominal_start
 from formation_env.dynamics import NONLINEAR
 from formation_env.envs import FormationEnv
 from formation_env.numerics.arrays import Array
+from formation_env.task.phases import Limits
 from formation_env.task.reward import ErrorCost
-from formation_env.task.scenario import Limits, Scenario
+from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import Leg, build_schedule, column, columns, leg_reference, legs
 
 _FAR_M: Final = 1e9

@@ -20,7 +20,8 @@ from formation_env.dropout.windows import Window, Windows
 from formation_env.formations import Following, ProjectedCircle
 from formation_env.numerics.arrays import Array
 from formation_env.task.loading import config_folder, load_scenario
-from formation_env.task.scenario import Phase, Scenario
+from formation_env.task.phases import Phase
+from formation_env.task.scenario import Scenario
 
 ENTRY: Final = ProjectedCircle(x0_m=0.0, vx0_m_s=1.8)
 """Orbit that section 5.2.4 enters at [0, 3324, 0, 1.8, 0, 3.6]."""

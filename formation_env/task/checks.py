@@ -1,20 +1,20 @@
-"""Checks of a whole scenario, beyond those of its single fields; each error names the key."""
+"""Checks of a scenario's parts against each other. Each raises a ValueError of one line that names key and value."""
 
 import math
-from typing import TYPE_CHECKING, Final
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
 from formation_env.dynamics import DYNAMICS, NONLINEAR, check_truth, get_dynamics
-from formation_env.dynamics.coasting import check_leader_path
 from formation_env.dynamics.nonlinear import substeps
+from formation_env.dynamics.perturbations import Perturbations
+from formation_env.dynamics.spacecraft import Spacecraft
 from formation_env.formations import Formation
 from formation_env.numerics.arrays import Array
 from formation_env.orbital.orbit import Orbit
 from formation_env.settings import nearest
-
-if TYPE_CHECKING:
-    from formation_env.task.scenario import Scenario
+from formation_env.task.phases import Limits, Phase, Start, whole_steps
 
 MAX_EPISODE_STEPS: Final = 1_000_000
 """Steps of an episode; beyond, even its observations as float32 take 150 MB."""
@@ -28,40 +28,25 @@ NONLINEAR_BYTES_PER_SUBSTEP: Final = 3_200
 """Measured addition for the leader's path, per integration step."""
 
 
-def check_scenario(scenario: "Scenario") -> None:
-    """Refuse unknown models, times that do not fit the step, and an impossible start.
-
-    Raises:
-        ValueError: one line that names the key and the value.
-    """
-    _check_models(scenario)
-    _check_spacecraft(scenario)
-    _check_durations(scenario)
-    check_memory(scenario, 1, "dt_s")
-    _check_start(scenario)
-    if scenario.dynamics == NONLINEAR:
-        check_leader_path(scenario.world, scenario.leader, scenario.num_steps * scenario.dt_s)
-    scenario.dropout.chain(scenario.dt_s, scenario.orbit)
-
-
-def check_memory(scenario: "Scenario", variants: int, key: str) -> None:
+def check_memory(key: str, steps: int, dt_s: float, dynamics: str, filter_dynamics: str) -> None:
     """Refuse tables larger than MAX_TABLE_BYTES.
 
     Args:
-        scenario: one variant.
-        variants: number of variants, taken as equally long.
         key: setting to name in the error.
+        steps: steps of all variants together.
+        dt_s: time step, s.
+        dynamics: name of the true dynamics.
+        filter_dynamics: name of the filter's.
 
     Raises:
         ValueError: naming the key, the size and the limit.
     """
     per_step = LINEAR_BYTES_PER_STEP
-    varying = {scenario.dynamics, scenario.filter_model.dynamics} - {NONLINEAR}
+    varying = {dynamics, filter_dynamics} - {NONLINEAR}
     if not all(get_dynamics(name).time_invariant for name in varying):
         per_step += VARYING_BYTES_PER_STEP
-    if scenario.dynamics == NONLINEAR:
-        per_step += NONLINEAR_BYTES_PER_SUBSTEP * substeps(scenario.dt_s)
-    steps = scenario.num_steps * variants
+    if dynamics == NONLINEAR:
+        per_step += NONLINEAR_BYTES_PER_SUBSTEP * substeps(dt_s)
     if steps * per_step > MAX_TABLE_BYTES:
         raise ValueError(
             f"{key}: tables of {steps} steps in all take about {steps * per_step / 1e9:.3g} GB; at most "
@@ -69,69 +54,68 @@ def check_memory(scenario: "Scenario", variants: int, key: str) -> None:
         )
 
 
-def _check_models(scenario: "Scenario") -> None:
+def check_models(dynamics: str, filter_dynamics: str | None, orbit: Orbit, perturbations: Perturbations) -> None:
     """Refuse unknown models, and a truth that would leave out what other settings ask for."""
     for key, name, known in (
-        ("dynamics", scenario.dynamics, [*DYNAMICS, NONLINEAR]),
-        ("filter.dynamics", scenario.filter.dynamics, [*DYNAMICS]),
+        ("dynamics", dynamics, [*DYNAMICS, NONLINEAR]),
+        ("filter.dynamics", filter_dynamics, [*DYNAMICS]),
     ):
         if name is not None and name not in known:
             raise ValueError(f"{key}: no dynamics model named {name[:80]!r}; {nearest(name, known)}")
-    check_truth(scenario.dynamics, scenario.orbit, scenario.perturbations)
+    check_truth(dynamics, orbit, perturbations)
 
 
-def _check_spacecraft(scenario: "Scenario") -> None:
+def check_spacecraft(follower: Spacecraft, leader: Spacecraft) -> None:
     """Refuse a thruster that never fires, and two spacecraft in different air."""
-    least, greatest = scenario.spacecraft.min_accel_m_s2, math.sqrt(3) * scenario.spacecraft.max_accel_m_s2
+    least, greatest = follower.min_accel_m_s2, math.sqrt(3) * follower.max_accel_m_s2
     if least > greatest:
         raise ValueError(
             f"spacecraft.min_accel_m_s2: must not be above the greatest thrust, {greatest:.4g}, got {least:g}"
         )
-    density, leaders = scenario.spacecraft.air_density_kg_m3, scenario.leader.air_density_kg_m3
+    density, leaders = follower.air_density_kg_m3, leader.air_density_kg_m3
     if leaders != density:
         raise ValueError(f"leader_spacecraft.air_density_kg_m3: must be the follower's, {density:g}, got {leaders:g}")
 
 
-def _check_durations(scenario: "Scenario") -> None:
+def check_durations(phases: Sequence[Phase], orbit: Orbit, dt_s: float) -> None:
     """Refuse too many steps, and phases shorter than a step."""
-    if not scenario.phases:
+    if not phases:
         raise ValueError("phases: must have at least one phase, got []")
-    periods = sum(phase.transfer_orbits + phase.hold_orbits for phase in scenario.phases)
-    steps = periods * scenario.orbit.period_s / scenario.dt_s
+    periods = sum(phase.transfer_orbits + phase.hold_orbits for phase in phases)
+    steps = periods * orbit.period_s / dt_s
     if steps > MAX_EPISODE_STEPS:
-        raise ValueError(f"dt_s: {steps:.7g} steps of {scenario.dt_s:g} s; an episode has at most {MAX_EPISODE_STEPS}")
-    for index, phase in enumerate(scenario.phases):
+        raise ValueError(f"dt_s: {steps:.7g} steps of {dt_s:g} s; an episode has at most {MAX_EPISODE_STEPS}")
+    for index, phase in enumerate(phases):
         for key, periods in (("transfer_orbits", phase.transfer_orbits), ("hold_orbits", phase.hold_orbits)):
-            if periods > 0 and scenario.steps(periods) == 0:
-                seconds = periods * scenario.orbit.period_s
+            if periods > 0 and whole_steps(periods, orbit, dt_s) == 0:
+                seconds = periods * orbit.period_s
                 raise ValueError(
                     f"phases.{index}.{key}: {periods:g} periods are {seconds:.4g} s, which rounds to no step of "
-                    f"dt_s = {scenario.dt_s:g} s"
+                    f"dt_s = {dt_s:g} s"
                 )
 
 
-def _check_start(scenario: "Scenario") -> None:
+def check_start(start: Start, phases: Sequence[Phase], limits: Limits, orbit: Orbit, dt_s: float) -> None:
     """Refuse a nominal start, or a change of phase, that would end the episode at once."""
-    limits = scenario.limits
-    place = _state(scenario.start.formation, scenario.orbit, "start.formation")[:3]
+    place = _state(start.formation, orbit, "start.formation")[:3]
     range_m = math.hypot(*place)
     if range_m < limits.keep_out_m:
         raise ValueError(
             f"start.formation: {range_m:.6g} m from the leader, inside limits.keep_out_m = {limits.keep_out_m:g} m"
         )
     start_s = 0.0
-    for index, phase in enumerate(scenario.phases):
-        _state(phase.formation, scenario.orbit, f"phases.{index}.formation")
-        arrival_s = start_s + scenario.steps(phase.transfer_orbits) * scenario.dt_s
-        end_s = arrival_s + scenario.steps(phase.hold_orbits) * scenario.dt_s
-        distance_m = math.dist(place, phase.formation.reference(start_s, scenario.orbit, arrival_s)[:3])
+    for index, phase in enumerate(phases):
+        _state(phase.formation, orbit, f"phases.{index}.formation")
+        arrival_s = start_s + whole_steps(phase.transfer_orbits, orbit, dt_s) * dt_s
+        end_s = arrival_s + whole_steps(phase.hold_orbits, orbit, dt_s) * dt_s
+        distance_m = math.dist(place, phase.formation.reference(start_s, orbit, arrival_s)[:3])
         if distance_m > limits.max_distance_m:
             key = f"phases.{index}.formation" if index else "start.formation"
             raise ValueError(
                 f"{key}: {distance_m:.6g} m between the {'phase before' if index else 'start'} and the phase's "
                 f"reference, beyond limits.max_distance_m = {limits.max_distance_m:g} m"
             )
-        place, start_s = phase.formation.reference(end_s, scenario.orbit, arrival_s)[:3], end_s
+        place, start_s = phase.formation.reference(end_s, orbit, arrival_s)[:3], end_s
 
 
 def _state(formation: Formation, orbit: Orbit, key: str) -> Array:

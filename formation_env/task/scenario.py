@@ -9,63 +9,19 @@ from pydantic import model_validator
 
 from formation_env.dropout import AnyDropout, GilbertElliott
 from formation_env.dynamics import NONLINEAR, DiscreteModel, get_dynamics
+from formation_env.dynamics.coasting import check_leader_path
 from formation_env.dynamics.perturbations import Perturbations
 from formation_env.dynamics.spacecraft import Spacecraft
 from formation_env.dynamics.world import World
-from formation_env.formations import AnyFormation, AtLeader
 from formation_env.navigation.filter_settings import FilterModel, KalmanFilter
 from formation_env.navigation.sensor import Sensor
 from formation_env.orbital.orbit import Orbit
-from formation_env.quantities import Acceleration, Distance, PositiveDistance, Speed
-from formation_env.settings import NonNegative, Positive, Text, settings
-from formation_env.task.checks import check_scenario
+from formation_env.quantities import Acceleration, PositiveDistance
+from formation_env.settings import Positive, Text, settings
+from formation_env.task.checks import check_durations, check_memory, check_models, check_spacecraft, check_start
+from formation_env.task.phases import Limits, Phase, Start, whole_steps
 from formation_env.task.randomization import DomainRandomization
 from formation_env.task.reward import Reward
-
-
-@settings(renamed={"spread_pos_m": "initial_sigma_pos_m", "spread_vel_m_s": "initial_sigma_vel_m_s"})
-class Start:
-    """Distribution of an episode's start.
-
-    Attributes:
-        formation: the nominal start is this formation's state.
-        initial_sigma_pos_m: 1-sigma of the true position about the nominal one, each axis, m.
-        initial_sigma_vel_m_s: 1-sigma of the true velocity about the nominal one, each axis, m/s.
-    """
-
-    formation: AnyFormation = AtLeader()
-    initial_sigma_pos_m: Distance = 10.0
-    initial_sigma_vel_m_s: Speed = 0.01
-
-
-@settings(renamed={"transfer_periods": "transfer_orbits", "hold_periods": "hold_orbits"})
-class Phase:
-    """One phase of the mission: a transfer to a formation, then its hold.
-
-    Both times are rounded to whole steps.
-
-    Attributes:
-        formation: the target; the follower should be at its state at the arrival.
-        transfer_orbits: duration of the transfer, in orbital periods; 0 for none.
-        hold_orbits: duration of the hold, in orbital periods.
-    """
-
-    formation: AnyFormation
-    transfer_orbits: NonNegative = 0.0
-    hold_orbits: Positive
-
-
-@settings
-class Limits:
-    """Limits that end an episode early.
-
-    Attributes:
-        max_distance_m: greatest distance from the reference, m.
-        keep_out_m: radius of the keep-out sphere around the leader, m; 0 for none.
-    """
-
-    max_distance_m: PositiveDistance = 50e3
-    keep_out_m: Distance = 0.0
 
 
 @settings
@@ -114,12 +70,19 @@ class Scenario:
     @model_validator(mode="after")
     def _check(self) -> Self:
         """Refuse what no single field can."""
-        check_scenario(self)
+        check_models(self.dynamics, self.filter.dynamics, self.orbit, self.perturbations)
+        check_spacecraft(self.spacecraft, self.leader)
+        check_durations(self.phases, self.orbit, self.dt_s)
+        check_memory("dt_s", self.num_steps, self.dt_s, self.dynamics, self.filter_model.dynamics)
+        check_start(self.start, self.phases, self.limits, self.orbit, self.dt_s)
+        if self.dynamics == NONLINEAR:
+            check_leader_path(self.world, self.leader, self.num_steps * self.dt_s)
+        self.dropout.chain(self.dt_s, self.orbit)
         return self
 
     def steps(self, periods: float) -> int:
         """Nearest whole number of steps of a time in orbital periods."""
-        return round(periods * self.orbit.period_s / self.dt_s)
+        return whole_steps(periods, self.orbit, self.dt_s)
 
     @property
     def num_steps(self) -> int:

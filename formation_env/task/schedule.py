@@ -8,8 +8,9 @@ from numpy.typing import ArrayLike
 
 from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, DiscreteModel
 from formation_env.numerics.arrays import Array
+from formation_env.task.phases import Phase
 from formation_env.task.reward import Scoring, scoring
-from formation_env.task.scenario import Phase, Scenario
+from formation_env.task.scenario import Scenario
 
 FIELDS: Final = {
     "reference": 6,  # reference state of the phase that is in force from this instant on, m and m/s

@@ -29,7 +29,9 @@ def draw_variants(scenario: Scenario) -> tuple[Scenario, ...]:
     randomization = scenario.domain_randomization
     if randomization is None:
         return (scenario,)
-    check_memory(scenario, randomization.variants, "domain_randomization.variants")
+    steps = randomization.variants * scenario.num_steps
+    dynamics, filter_dynamics = scenario.dynamics, scenario.filter_model.dynamics
+    check_memory("domain_randomization.variants", steps, scenario.dt_s, dynamics, filter_dynamics)
     for name, key in _OF_DROPOUT.items():
         if name in randomization.ranges and not hasattr(scenario.dropout, key):
             raise ValueError(f"domain_randomization.{name}: dropout {scenario.dropout.kind} has no {key}")

@@ -26,8 +26,8 @@ from formation_env.formations import FORMATIONS
 from formation_env.kernel.metrics import METRICS
 from formation_env.settings import build
 from formation_env.task.observation import markdown_table
+from formation_env.task.phases import Phase
 from formation_env.task.randomization import DomainRandomization
-from formation_env.task.scenario import Phase
 
 ROOT = Path(__file__).parents[2]
 PAGES = {str(path.relative_to(ROOT)): path.read_text("utf-8") for path in [ROOT / "README.md", *ROOT.glob("docs/*.md")]}

@@ -13,7 +13,8 @@ from formation_env.formations import Following, SpaceCircle
 from formation_env.navigation.filter_settings import KalmanFilter
 from formation_env.navigation.sensor import Sensor
 from formation_env.task.observation import BOUND
-from formation_env.task.scenario import Limits, Phase, Reward, Start
+from formation_env.task.phases import Limits, Phase, Start
+from formation_env.task.scenario import Reward
 
 STRONG = Spacecraft(max_accel_m_s2=q.MAX_ACCEL_M_S2, thrust_noise=q.MAX_THRUST_NOISE)
 HEAVY_AIR = Spacecraft(

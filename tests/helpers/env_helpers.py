@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from formation_env import FormationEnv, FormationVectorEnv, Scenario, load_scenario
 from formation_env.dropout import Dropout, NoDropout
 from formation_env.navigation.sensor import Sensor
-from formation_env.task.scenario import Limits, Start
+from formation_env.task.phases import Limits, Start
 
 Array = NDArray[np.float64]
 

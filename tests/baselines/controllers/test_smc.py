@@ -16,7 +16,8 @@ from formation_env.dynamics.spacecraft import Spacecraft
 from formation_env.navigation.filter_settings import KalmanFilter
 from formation_env.navigation.sensor import Sensor
 from formation_env.numerics.arrays import Array
-from formation_env.task.scenario import Scenario, Start
+from formation_env.task.phases import Start
+from formation_env.task.scenario import Scenario
 
 DT_S = 2.0
 CE = np.hstack([np.diag([1.0, 0.8, 1.2]), np.diag([500.0, 600.0, 400.0])])

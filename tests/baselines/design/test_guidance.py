@@ -23,7 +23,7 @@ from formation_env import ConfigError, FormationVectorEnv, Scenario, load_scenar
 from formation_env.evaluation.rollout import evaluate
 from formation_env.formations import AnyFormation, Following, Parallel, ProjectedCircle, SpaceCircle, XYEllipse
 from formation_env.numerics.arrays import Array
-from formation_env.task.scenario import Phase
+from formation_env.task.phases import Phase
 from formation_env.task.schedule import leg_reference, legs
 
 TRANSFERS = [(name, index) for name, count in (("initialization", 1), ("mission", 2)) for index in range(count)]

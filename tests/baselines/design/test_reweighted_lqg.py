@@ -22,8 +22,9 @@ from formation_env import FormationVectorEnv, load_scenario
 from formation_env.dropout import NoDropout
 from formation_env.evaluation.rollout import evaluate
 from formation_env.navigation.sensor import Sensor
+from formation_env.task.phases import Start
 from formation_env.task.reward import Reward
-from formation_env.task.scenario import Scenario, Start
+from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import build_schedule, column, leg_reference, legs
 
 

@@ -32,7 +32,7 @@ from formation_env.evaluation.rollout import evaluate
 from formation_env.formations import Following, InTrack
 from formation_env.orbital.constants import OMEGA_EARTH, R_EARTH
 from formation_env.orbital.orbit import Orbit
-from formation_env.task.scenario import Limits
+from formation_env.task.phases import Limits
 
 ROOT = Path(__file__).parents[3]
 COARSE_S = 30.0

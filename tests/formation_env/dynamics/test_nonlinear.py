@@ -18,7 +18,7 @@ from formation_env.navigation.filter_settings import KalmanFilter
 from formation_env.orbital.constants import MU_EARTH
 from formation_env.orbital.elements import Elements, secular_rates, to_cartesian
 from formation_env.orbital.orbit import Orbit
-from formation_env.task.scenario import Limits, Phase
+from formation_env.task.phases import Limits, Phase
 
 Array = NDArray[np.float64]
 FORCES = ("twobody", "j2", "j2drag_same", "j2drag_diff")

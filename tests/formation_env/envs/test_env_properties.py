@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from formation_env import FormationEnv, FormationVectorEnv, Scenario, load_scenario
 from formation_env.dropout import Bernoulli
-from formation_env.task.scenario import Limits
+from formation_env.task.phases import Limits
 
 SCENARIOS = {
     "keeping": load_scenario("keeping"),

@@ -16,7 +16,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 from formation_env import FormationEnv, FormationVectorEnv, Scenario, load_scenario
 from formation_env.dropout import Bernoulli
 from formation_env.task.observation import observation_layout
-from formation_env.task.scenario import Limits
+from formation_env.task.phases import Limits
 
 STEPS = 90
 

@@ -16,7 +16,7 @@ from formation_env.evaluation.seeds import seeds
 from formation_env.evaluation.statistics import summarise
 from formation_env.kernel.metrics import METRICS, Metric
 from formation_env.task.observation import SLICES
-from formation_env.task.scenario import Limits, Phase
+from formation_env.task.phases import Limits, Phase
 
 
 class Damper:

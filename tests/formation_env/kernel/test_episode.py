@@ -10,7 +10,8 @@ from scipy.integrate import solve_ivp
 
 from formation_env import FormationEnv, Scenario, Spacecraft, load_scenario, propagate
 from formation_env.formations import Following
-from formation_env.task.scenario import Limits, Phase, Reward
+from formation_env.task.phases import Limits, Phase
+from formation_env.task.scenario import Reward
 
 J2, R_EARTH = 1.08263e-3, 6378136.6
 COASTING = np.zeros((2000, 3), np.float32)

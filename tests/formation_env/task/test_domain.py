@@ -12,7 +12,7 @@ from formation_env import Orbit, Scenario, Spacecraft, load_scenario, propagate,
 from formation_env.dynamics.perturbations import Perturbations
 from formation_env.formations import AtLeader, Following, Formation
 from formation_env.task.domain import DomainWarning, curvature_error_m, facts_of, valid_range_m, warnings_of
-from formation_env.task.scenario import Phase, Start
+from formation_env.task.phases import Phase, Start
 
 KEPLER = Orbit(j2=False)
 RADIUS_M = R_EARTH + 600e3

@@ -19,7 +19,7 @@ from formation_env.orbital.orbit import Orbit
 from formation_env.quantities import Coordinate, Duration
 from formation_env.settings import settings
 from formation_env.task.loading import kinds, scenario_schema
-from formation_env.task.scenario import Phase, Start
+from formation_env.task.phases import Phase, Start
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from env_helpers import mean_motion
 from formation_env import ENV_IDS, ConfigError, FormationEnv, Scenario, Spacecraft, load_scenario, scenario_names
 from formation_env.formations import AtLeader, Following, SpaceCircle
 from formation_env.task.loading import config_folder
-from formation_env.task.scenario import Limits, Phase, Start
+from formation_env.task.phases import Limits, Phase, Start
 
 PHASES = "phases: [{formation: {kind: following}, hold_orbits: 1}]\n"
 

@@ -11,7 +11,8 @@ from formation_env.dropout import Window, Windows
 from formation_env.formations import Following, InTrack, Parallel, ProjectedCircle
 from formation_env.navigation.filter_settings import KalmanFilter
 from formation_env.task.observation import observation_layout
-from formation_env.task.scenario import Limits, Phase, Reward
+from formation_env.task.phases import Limits, Phase
+from formation_env.task.scenario import Reward
 from formation_env.task.schedule import FIELDS, OFFSETS, build_schedule, leg_reference, legs
 
 COARSE = [name for name in scenario_names() if not name.startswith("thesis")]
