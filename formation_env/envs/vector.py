@@ -149,10 +149,12 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         simulation = self.simulation
         simulation.actions[:] = actions
         simulation.step(self._observations)
-        if len(self._waiting):  # a reset overwrites the rows' step, and clears their flags
+        waiting = len(self._waiting) > 0
+        if waiting:  # a reset overwrites the rows' step, and clears their flags
             simulation.reset(self._waiting, self._observations)
         rewards = simulation.read("reward")
-        rewards[self._waiting] = 0.0
+        if waiting:
+            rewards[self._waiting] = 0.0
         terminations, truncations = simulation.read("terminated", dtype=bool), simulation.read("truncated", dtype=bool)
         complete = ended = np.flatnonzero(terminations | truncations)
         if self._is_cut:
