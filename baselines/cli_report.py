@@ -43,7 +43,7 @@ class ReportArguments:
     processes: Processes = PROCESSES
 
     def options(self) -> "ReportOptions":
-        """How much the report flies."""
+        """Options of the report."""
         from baselines.report import ReportOptions
 
         return ReportOptions(

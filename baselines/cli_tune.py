@@ -95,7 +95,7 @@ def tune(
 
 
 def settings_file(name: str, out: Path | None) -> Path:
-    """Where the settings for an environment are written.
+    """Path of the settings file of an environment.
 
     Args:
         name: registered id, scenario name or YAML file.

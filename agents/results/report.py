@@ -51,7 +51,7 @@ class Learned:
         return next((actor for actor in map(_open, self.sources) if actor.scenario == original), None)
 
     def settings(self, original: Scenario) -> dict[str, Any] | None:
-        """What tells its policy for a scenario from others, as plain data; None if it has none."""
+        """Identity of its policy for a scenario as plain data; None if it has none."""
         actor = self(original, original)
         if actor is None:
             return None

@@ -93,7 +93,7 @@ def search(
 
 
 def identity(run: Run) -> dict[str, str | int]:
-    """What a study states in its journal."""
+    """Identity of a study, stored in its journal."""
     return {"algorithm": run.algorithm, "task": task_name(run)}
 
 

@@ -23,7 +23,7 @@ class AccelerationPolicy(ABC):
         Settings: class of its settings, made with `formation_env.settings.settings`.
         search_space: settings that a tuning study varies, all of them in default.yaml; empty if it has none.
         library: library that it needs beside the package's own dependencies, of the extra `optimal`.
-        slow: whether an action takes a hundred times as long as a gain matrix does, so that fewer episodes are flown.
+        slow: whether the time per action is about a hundred times a gain matrix's, so that reports fly fewer episodes.
         is_reference: whether it is there to be beaten by every controller; sweeps and close-ups leave it out.
         proportional: whether small errors ask for small thrusts, which a thruster with a minimum thrust does not give.
         color: colour in figures; by default grey for a reference policy, else the next free one.

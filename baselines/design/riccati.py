@@ -18,7 +18,7 @@ from formation_env.settings import ConfigError
 SLOWEST_FADING: Final = 1e-9
 """Least share of an error that a regulator takes off in a step (or a second); less is rounding, or drag."""
 OVERLOAD: Final = 10.0
-"""How much more a control costs in `least_fuel_gains`, per limit beyond the limit."""
+"""Extra cost of a control beyond the limit in `least_fuel_gains`, per limit."""
 
 
 def stationary(Phi: Array, Gamma: Array, Q: Array, R: Array) -> tuple[Array, Array]:

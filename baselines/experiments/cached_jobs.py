@@ -61,7 +61,7 @@ class CachedJob:
 
 
 def cached(jobs: Mapping[Name, TableJob], folder: Path | None) -> dict[Name, Job]:
-    """The same jobs, with their tables cached in a folder; jobs without a key run every time.
+    """Wrap jobs so that their tables are cached in a folder; jobs without a key run every time.
 
     Args:
         jobs: by name.

@@ -15,7 +15,7 @@ MAX_NAMES: Final = 3
 
 
 class ProgressBar(Protocol):
-    """What the display offers to the work."""
+    """Interface of a progress display."""
 
     def advance(self, amount: int) -> None:
         """Add work done since the last call."""

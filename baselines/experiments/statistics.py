@@ -94,7 +94,7 @@ class Results:
         return float(costs.mean()), *bootstrap_interval(costs)
 
     def behind(self, policy: str, other: str) -> Interval:
-        """How much more than a compared-with policy another one costs on the seeds of both, m/s."""
+        """Extra cost of another policy over a reference, on the seeds of both, m/s."""
         return negative(self.differences[policy][other]["return"])
 
     def verdict(self, policy: str, other: str) -> bool | None:

@@ -36,7 +36,7 @@ class Scale:
         return cls(False, low - pad, high + pad)
 
     def settings(self, axis: str) -> dict[str, Any]:
-        """What plotly's layout needs for the axis `xaxis` or `yaxis`."""
+        """Entries of plotly's layout for the axis `xaxis` or `yaxis`."""
         ends = [math.log10(self.low), math.log10(self.high)] if self.log else [self.low, self.high]
         wide = self.log and ends[1] - ends[0] > _FEW_DECADES
         return {

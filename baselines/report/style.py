@@ -19,7 +19,7 @@ MAX_POINTS: Final = 1500
 
 @dataclass(frozen=True)
 class Look:
-    """How a policy is drawn in every figure.
+    """Look of a policy in every figure.
 
     Attributes:
         color: of dots and lines.

@@ -30,7 +30,7 @@ BATCH: Final = 8
 
 @dataclass(frozen=True, kw_only=True)
 class TuningTask:
-    """What a search optimises.
+    """Task of a search.
 
     Attributes:
         policy: name of the policy.

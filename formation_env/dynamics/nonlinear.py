@@ -25,7 +25,7 @@ from formation_env.orbital.frames import eci_to_lvlh, lvlh_axes, lvlh_frame, lvl
 NODES: Final = (0.0, 1 / 3, 1 / 2, 2 / 3)
 """Instants within a substep at which the leader is needed, and the next substep's first."""
 FIELDS: Final = {"position": 0, "velocity": 3, "acceleration": 6, "x_axis": 9, "y_axis": 12, "z_axis": 15}
-"""Where a node of the leader's table has which vector, all along ECI."""
+"""Offsets of the vectors in a node of the leader's table, all along ECI."""
 FAR_FIELDS: Final = {"sun": 18, "moon": 21}
 """Further vectors of a node if the Sun or the Moon acts."""
 NEAR_WIDTH: Final = 3 * len(FIELDS)

@@ -37,7 +37,7 @@ NONLINEAR_FAR: Final = 3  # Sun, Moon and radiation pressure, too
 
 
 def truth_kind(scenario: Scenario) -> int:
-    """How the true motion comes about."""
+    """Kind of the true motion."""
     if scenario.dynamics == NONLINEAR:
         return NONLINEAR_FAR if scenario.perturbations.far_bodies else NONLINEAR_NEAR
     return _linear_kind(scenario.true_dynamics())

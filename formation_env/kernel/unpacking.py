@@ -18,21 +18,21 @@ class Model(NamedTuple):
 
 
 class ProcessNoise(NamedTuple):
-    """The process noise that the filter believes in: upper triangles of its covariances over a step."""
+    """Process noise of the filter's model: upper triangles of its covariances over a step."""
 
     Q_in_plane: Any  # 10
     Q_cross_track: Any  # 3
 
 
 class SensorNoise(NamedTuple):
-    """The sensor that the filter believes in."""
+    """Sensor of the filter's model."""
 
     variances: Any  # 2: of a measured position and velocity axis
     measures: Any  # 2: 1 where the sensor measures positions, velocities
 
 
 class Forces(NamedTuple):
-    """What acts in the nonlinear truth."""
+    """Forces of the nonlinear truth."""
 
     substeps: float
     j2: float

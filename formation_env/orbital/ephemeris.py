@@ -1,4 +1,4 @@
-"""Where the Sun and the Moon are (ECI), for their pull and the Sun's light (Ma 2009, eq. 2.34-2.41).
+"""Positions of the Sun and the Moon in ECI, for gravity and radiation pressure (Ma 2009, eq. 2.34-2.41).
 
 Axes are those of the mean equator and equinox J2000 (GCRS). Dates outside 1900-2100 make ERFA warn.
 """

@@ -1,1 +1,1 @@
-"""What is flown and how it is scored: scenarios, schedules, rewards and observations."""
+"""Tasks: scenarios, schedules, rewards and observations."""

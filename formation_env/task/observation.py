@@ -92,7 +92,7 @@ SIZE: Final = sum(block.size for block in BLOCKS)
 
 @dataclass(frozen=True)
 class ObservationLayout:
-    """Where each quantity stands in a scenario's observation, and its scale.
+    """Places and scales of the quantities in a scenario's observation.
 
     Attributes:
         length_m: L, the largest distance of the plan from the leader; at least 1 km, and at least so much that errors

@@ -112,7 +112,7 @@ def coast_matrices(table: Array) -> Array:
 
 
 def _fill_plan(table: Array, scenario: Scenario, leg: Leg) -> None:
-    """What to do from each instant of the leg on (its end belongs to the next leg, if there is one)."""
+    """Fill in the plan from each instant of the leg on (its end belongs to the next leg, if there is one)."""
     steps = np.arange(leg.start, leg.end + 1)
     in_force = slice(leg.start, leg.end + 1)
     reference = leg_reference(scenario, leg, steps)

@@ -58,7 +58,7 @@ def fly(env: FormationEnv, actions: NDArray[np.float32], **reset: Any) -> list[t
 
 
 def fly_rows(env: FormationVectorEnv, actions: NDArray[np.float32], **reset: Any) -> list[tuple[Any, ...]]:
-    """The same of a batch, for actions (steps, rows, 3)."""
+    """Fly a batch, with actions (steps, rows, 3)."""
     return [env.reset(**reset), *(env.step(action) for action in actions)]
 
 

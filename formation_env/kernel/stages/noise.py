@@ -16,7 +16,7 @@ NUM_NORMALS: Final = 10
 PROCESS_NORMALS: Final = slice(0, 3)
 SENSOR_NORMALS: Final = slice(3, 9)
 THRUST_NORMAL: Final = 9
-"""Which of them disturb the acceleration, the measurement and the thrust's magnitude."""
+"""Normals that disturb the acceleration, the measurement and the thrust's magnitude."""
 FIRST_PROCESS_NOISE: Final = field.NORMAL
 FIRST_SENSOR_NOISE: Final = field.NORMAL + 3 * LANES
 THRUST_NOISE: Final = field.NORMAL + THRUST_NORMAL * LANES

@@ -1,4 +1,4 @@
-"""The search of gains: it never gets worse, it can be stopped and gone on with, and it says how it was made."""
+"""Search of settings: it never gets worse, it can be interrupted and continued, and it says how it was made."""
 
 import re
 import sys

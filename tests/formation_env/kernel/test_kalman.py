@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter as Textbook
-from lane_filter import (
+from oracles import Array, random_covariance
+from row_filter import (
     BOTH,
     NOTHING,
     POSITION,
@@ -13,7 +14,6 @@ from lane_filter import (
     measure_first,
     symmetric,
 )
-from oracles import Array, random_covariance
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 

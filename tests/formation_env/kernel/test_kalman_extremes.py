@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from env_helpers import covariances
-from lane_filter import BOTH, POSITION, LaneFilter, Pair
 from oracles import Array
+from row_filter import BOTH, POSITION, LaneFilter, Pair
 
 from formation_env import FormationVectorEnv, load_scenario
 from formation_env.dropout import NoDropout

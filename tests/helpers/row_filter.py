@@ -47,7 +47,7 @@ def join(in_plane: Row, cross_track: Row) -> Array:
 
 
 def triangles(matrix: Array) -> tuple[Row, Row]:
-    """The same of a symmetric matrix (6, 6) without coupling, as upper triangles."""
+    """Split a symmetric matrix (6, 6) without coupling into upper triangles."""
     blocks = (matrix[np.ix_(part, part)] for part in (IN_PLANE, CROSS_TRACK))
     in_plane, cross_track = (tuple(upper_triangle(block)) for block in blocks)
     return in_plane, cross_track
