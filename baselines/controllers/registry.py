@@ -34,6 +34,8 @@ _CLASSES: Final[tuple[type[AccelerationPolicy], ...]] = (
 )
 POLICIES: Final[dict[str, type[AccelerationPolicy]]] = {each.name: each for each in _CLASSES}
 """Classes made with (scenario, settings), the settings being of the class's `Settings`."""
+FORMER_NAMES: Final = {"lqr_planned": "lqr_nominal", "lqr_tracking": "lqr_quasi_static"}
+"""Names of earlier versions; the error for one gives the name of now."""
 COARSE_THRUST: Final = 0.1
 """Minimum thrust over the limit from which on proportional laws are warned of: in keeping `lqr` errs 4 times as far."""
 
@@ -97,8 +99,13 @@ def policy_class(name: str) -> type[AccelerationPolicy]:
         ConfigError: there is none of that name; one line with its nearest neighbour.
     """
     if name not in POLICIES:
-        raise ConfigError(f"no policy named {name!r}; {nearest(name, POLICIES)}")
+        raise ConfigError(f"no policy named {name!r}; {_hint(name)}")
     return POLICIES[name]
+
+
+def _hint(name: str) -> str:
+    """The new name of a renamed policy, or the nearest neighbour of a misspelt one."""
+    return f"now {FORMER_NAMES[name]}" if name in FORMER_NAMES else nearest(name, POLICIES)
 
 
 def _warn_of_coarse_thrust(kind: type[AccelerationPolicy], scenario: Scenario) -> None:
@@ -159,5 +166,5 @@ def read_settings(name: str, path: Path) -> Any:
         raise ConfigError(f"{path}: (top level): must be a mapping of policies, got {str(sections)[:80]}")
     for section in sections:
         if section not in POLICIES:
-            raise ConfigError(f"{path}: {section}: no policy of that name; {nearest(str(section), POLICIES)}")
+            raise ConfigError(f"{path}: {section}: no policy of that name; {_hint(str(section))}")
     return build(policy_class(name).Settings, sections.get(name, {}), f"{path}: {name}")

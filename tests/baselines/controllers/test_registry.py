@@ -152,6 +152,17 @@ def test_renamed_keys_name_the_new_one() -> None:
             make_policy(name, "keeping", {"keeping": {"band_m": 3.0}})
 
 
+@pytest.mark.parametrize(("former", "new"), [("lqr_planned", "lqr_nominal"), ("lqr_tracking", "lqr_quasi_static")])
+def test_former_names_give_the_new_ones(former: str, new: str, tmp_path: Path) -> None:
+    """As a policy, and as a section of a settings file."""
+    with pytest.raises(ConfigError, match=f"no policy named '{former}'; now {new}"):
+        make_policy(former, "keeping")
+    path = tmp_path / "own.yaml"
+    path.write_text(f"{former}: {{}}\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match=f"own.yaml: {former}: no policy of that name; now {new}"):
+        make_policy("lqr", "keeping", path)
+
+
 def test_settings_files_are_utf_8_in_every_locale(tmp_path: Path) -> None:
     """Adding a section keeps the comments, even where the locale knows ASCII only."""
     path = tmp_path / "own.yaml"
