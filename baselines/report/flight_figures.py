@@ -14,6 +14,8 @@ from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import legs
 
 ROWS = ("error, m", "thrust, mm/s²", "cumulative Δv, m/s")
+RESOLVED_BANDS = 600
+"""Bands across a figure that a screen can tell apart."""
 THRUST_FLOOR = 1e-4
 """Thrust below this share of the limit is drawn as none: a solver leaves 1e-10 where it means zero."""
 _THRUST = ["ax_m_s2", "ay_m_s2", "az_m_s2"]
@@ -101,7 +103,7 @@ def outage_path(flight: pd.DataFrame, scenario: Scenario) -> str:
     starts, ends = np.flatnonzero(np.diff(lost) == 1), np.flatnonzero(np.diff(lost) == -1)
     if len(starts) == 0:
         return ""
-    apart = np.flatnonzero(starts[1:] - ends[:-1] > len(flight) / 600)  # closer ones would be one on the screen
+    apart = np.flatnonzero(starts[1:] - ends[:-1] > len(flight) / RESOLVED_BANDS)
     starts, ends = starts[np.r_[0, apart + 1]], ends[np.r_[apart, len(ends) - 1]]
     unit = scenario.dt_s / scenario.orbit.period_s
     spans = np.clip((np.column_stack([starts, ends]) - 0.5) * unit, 0, None)

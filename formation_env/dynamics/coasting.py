@@ -17,6 +17,8 @@ TOLERANCE: Final = 1e-12
 """Relative error of the leader's path per step of its integration."""
 ABSOLUTE_TOLERANCE: Final = 1e-9
 """Absolute error of the same, m and m/s."""
+REENTRY_MARGIN: Final = 1.01
+"""The last state before an integration stops at re-entry is up to one step above that altitude."""
 REENTRY_ALTITUDE_M: Final = 80e3
 """Altitude at which spacecraft break up; below it no orbit lasts a revolution."""
 OSCILLATION_M: Final = 20e3
@@ -78,7 +80,7 @@ def _lost(world: World, craft: Spacecraft, error: IntegrationError, who: str) ->
     """The one line that says why a flight without thrust ended early."""
     lowest = error.state.reshape(-1, 6)[_altitude_m(error.state).argmin()]
     altitude_m = _altitude_m(lowest)[0]
-    if altitude_m <= 1.01 * REENTRY_ALTITUDE_M:
+    if altitude_m <= REENTRY_MARGIN * REENTRY_ALTITUDE_M:
         return (
             f"{who}: re-enters at t = {error.time_s:.6g} s ({error.time_s / world.orbit.period_s:.3g} orbits), when it "
             f"is below {REENTRY_ALTITUDE_M:g} m"
