@@ -10,7 +10,7 @@ from formation_env.evaluation.rollout import Policy
 from formation_env.numerics.arrays import Actions, Observations
 
 
-class SideBySide:
+class PolicyBatch:
     """Policies that fly equal shares of a batch's rows, in order; each keeps a state of its own."""
 
     def __init__(self, policies: Sequence[Policy]) -> None:

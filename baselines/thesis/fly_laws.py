@@ -6,7 +6,7 @@ from typing import Any, Final
 import numpy as np
 
 from baselines.design.guidance import GuidanceName
-from baselines.experiments.policy_batch import SideBySide
+from baselines.experiments.policy_batch import PolicyBatch
 from baselines.thesis.flight_recorder import MEASUREMENT, FlightRecorder, recorded_steps
 from baselines.thesis.recorded_flights import Flights
 from formation_env.envs import interface
@@ -44,7 +44,7 @@ def fly_laws(
         progress: called with the number of steps completed since the last call, over all rows.
     """
     env = FormationVectorEnv(len(policies) * len(seeds), scenario, analysis=measured)
-    batch = SideBySide(policies)
+    batch = PolicyBatch(policies)
     options = None if start is None else {interface.START_OPTION: start}
     observations, infos = env.reset(seed=[*seeds] * len(policies), options=options)
     log = FlightRecorder(scenario, (len(policies), len(seeds)), recorded_steps(scenario, every), few, guide)

@@ -13,7 +13,7 @@ import numpy as np
 
 from baselines.controllers.registry import make_policy
 from baselines.controllers.search_space import Parameter
-from baselines.experiments.policy_batch import SideBySide
+from baselines.experiments.policy_batch import PolicyBatch
 from baselines.tuning.journal import add_trial, digest, open_study, trials_of
 from baselines.tuning.search_space import apply, current_values
 from formation_env.evaluation.rollout import MAX_ROWS, Policy, evaluate
@@ -87,7 +87,7 @@ def costs(policies: Sequence[Policy], scenario: Scenario, episode_seeds: Sequenc
     # evaluate splits larger batches, and the policies would not get equal shares of the parts
     at_once = max(1, MAX_ROWS // len(episode_seeds))
     groups = [policies[i : i + at_once] for i in range(0, len(policies), at_once)]
-    returns = [evaluate(SideBySide(group), scenario, [*episode_seeds] * len(group))["return"] for group in groups]
+    returns = [evaluate(PolicyBatch(group), scenario, [*episode_seeds] * len(group))["return"] for group in groups]
     per_policy: Array = -np.concatenate(returns).reshape(len(policies), -1).mean(axis=1)
     return per_policy
 

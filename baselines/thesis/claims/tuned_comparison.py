@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from baselines.controllers.registry import make_policy
-from baselines.experiments.policy_batch import SideBySide
+from baselines.experiments.policy_batch import PolicyBatch
 from baselines.thesis import figure_flights, scenarios
 from baselines.thesis.claims.shared_flights import ClaimOptions
 from formation_env.evaluation.rollout import evaluate
@@ -123,7 +123,7 @@ def outcome(
 ) -> Outcome:
     """Fly a law with several settings on the same seeds."""
     policies = [make_policy(law, scenario, one) for one in candidate_settings]
-    table = evaluate(SideBySide(policies), scenario, [*episode_seeds] * len(policies))
+    table = evaluate(PolicyBatch(policies), scenario, [*episode_seeds] * len(policies))
     delta_v, error = (
         table[name].to_numpy(float).reshape(len(policies), -1) for name in ("delta_v_m_s", "position_error_mean_m")
     )

@@ -7,7 +7,7 @@ from typing import Any, Final
 import pandas as pd
 
 from baselines.controllers.registry import make_policy
-from baselines.experiments.policy_batch import SideBySide
+from baselines.experiments.policy_batch import PolicyBatch
 from formation_env.dynamics import NONLINEAR
 from formation_env.evaluation.rollout import evaluate
 from formation_env.evaluation.statistics import bootstrap_interval
@@ -96,7 +96,7 @@ class Trial:
         """Lines by episode: scenario, truth, policy, seed, cost_m_s, delta_v_m_s, position_error_mean_m."""
         settings = config_folder("baselines") / f"{self.comparison.settings}.yaml"
         policies = [make_policy(law, self.scenario, settings) for law in self.comparison.laws]
-        flown = evaluate(SideBySide(policies), self.scenario, [*self.seeds] * len(policies))
+        flown = evaluate(PolicyBatch(policies), self.scenario, [*self.seeds] * len(policies))
         flown.insert(0, "policy", [law for law in self.comparison.laws for _ in self.seeds])
         flown = flown.assign(scenario=self.comparison.scenario, truth=self.truth, cost_m_s=-flown["return"])
         progress(self.cost)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.experiments.policy_batch import SideBySide
+from baselines.experiments.policy_batch import PolicyBatch
 from formation_env import load_scenario
 from formation_env.evaluation.rollout import evaluate
 from formation_env.numerics.arrays import Actions, Observations
@@ -38,6 +38,6 @@ def test_policies_with_memory_fly_as_they_do_alone() -> None:
     """Equal bits, episode by episode."""
     scenario, seeds = dataclasses.replace(load_scenario("keeping"), dt_s=240.0), [1, 2, 3]
     policies = [Alternating(0.02), Alternating(0.3)]
-    together = evaluate(SideBySide(policies), scenario, [*seeds, *seeds])["return"].to_numpy().reshape(2, 3)
+    together = evaluate(PolicyBatch(policies), scenario, [*seeds, *seeds])["return"].to_numpy().reshape(2, 3)
     alone = [evaluate(policy, scenario, seeds)["return"].to_numpy() for policy in policies]
     np.testing.assert_array_equal(together, alone)

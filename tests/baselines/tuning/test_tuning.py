@@ -14,7 +14,7 @@ from baselines.cli import app
 from baselines.cli_tune import make_task as task
 from baselines.cli_tune import settings_file
 from baselines.controllers.registry import POLICIES, make_policy, read_settings
-from baselines.experiments.policy_batch import SideBySide
+from baselines.experiments.policy_batch import PolicyBatch
 from baselines.tuning import study
 from baselines.tuning.journal import open_study
 from baselines.tuning.search_space import (
@@ -74,7 +74,7 @@ def test_side_by_side_is_one_after_the_other(monkeypatch: pytest.MonkeyPatch) ->
     policies = [make_policy(name, scenario) for name in ("zero", "smc", "lqr")]
     alone = [-evaluate(policy, scenario, flown)["return"].mean() for policy in policies]
     np.testing.assert_allclose(costs(policies, scenario, flown), alone, rtol=1e-12)
-    assert SideBySide(policies).predict(np.zeros((6, 38), np.float32))[0].shape == (6, 3)
+    assert PolicyBatch(policies).predict(np.zeros((6, 38), np.float32))[0].shape == (6, 3)
     for module in (rollout, study):
         monkeypatch.setattr(module, "MAX_ROWS", 7)
     np.testing.assert_allclose(costs(policies, scenario, flown), alone, rtol=1e-12)
