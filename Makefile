@@ -12,7 +12,7 @@ TEST   := $(VENV)/.stamp-test
 INPUTS := pyproject.toml constraints.txt
 # OpenBLAS chooses its kernels by the processor; these are the common ones. Nehalem multiplies without fused adds.
 CORES     := Haswell Zen SkylakeX Nehalem
-NUMERICAL := tests/baselines/design/test_riccati.py tests/baselines/design/test_riccati_solver.py \
+NUMERICAL := tests/baselines/design/test_riccati.py tests/baselines/design/test_riccati_solver.py tests/baselines/design/test_transfers.py \
              tests/baselines/design/test_steady_state_filter.py tests/baselines/controllers/test_policy_settings.py \
              tests/formation_env/dynamics/test_dynamics.py tests/formation_env/orbital
 # Tests that fly episodes compile the step, which has no BLAS.

@@ -15,6 +15,8 @@ from formation_env.orbital.constants import MU_EARTH
 
 LEAST_LEVERAGE: Final = 1 / 30
 """Least effect of an impulse on the position that it should change, in units of the transfer time or of 1 / n."""
+ROUNDING_LEVERAGE: Final = 1e-9
+"""Share of the greatest leverage below which one is the rounding of zero: dividing by it gives noise, by any BLAS."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,8 @@ def two_impulse(model: DiscreteModel, time_s: float, mean_motion_rad_s: float, s
     # r_B = Phi_rr r_A + Phi_rv (v_A + impulse), one direction of leverage after the other
     U, leverage_s, Vt = np.linalg.svd(model.Phi[:3, 3:])
     miss = U.T @ (goal - coast)[:3]
-    parts = miss / np.maximum(leverage_s, 1e-9 * leverage_s[0])
+    resolved_s = ROUNDING_LEVERAGE * leverage_s[0]
+    parts = miss / np.maximum(leverage_s, resolved_s)
     if np.abs(parts).max() * LEAST_LEVERAGE * min(time_s, 1 / mean_motion_rad_s) > np.linalg.norm(miss):
         worst = int(np.abs(parts).argmax())
         raise ValueError(
@@ -145,6 +148,6 @@ def two_impulse(model: DiscreteModel, time_s: float, mean_motion_rad_s: float, s
             f"reach the goal: {abs(miss[worst]):.4g} m off along LVLH {np.round(U[:, worst], 2).tolist()}, on which "
             "the first has no leverage"
         )
-    first = Vt.T @ parts
+    first = Vt.T @ np.where(leverage_s > resolved_s, parts, 0.0)
     arrival = coast + model.Phi[:, 3:] @ first
     return TwoImpulse(first, (goal - arrival)[3:])
