@@ -22,7 +22,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_env.files import replacing
+from formation_env.files import hash_sources, replacing
 
 SUFFIX: Final = ".result"
 MAX_FILE_BYTES: Final = 256 * 2**20
@@ -110,14 +110,6 @@ def source_hash() -> str:
         for path in sorted((root / package).rglob("*.py"))
         if not path.relative_to(root).as_posix().startswith(_PRESENTATION)
     )
-
-
-def hash_sources(paths: Any) -> str:
-    """SHA-256 over the names and contents of files, hexadecimal."""
-    total = hashlib.sha256()
-    for path in paths:
-        total.update(path.name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
-    return total.hexdigest()
 
 
 def remove_temporaries(folder: Path, names: Callable[[str], bool] = lambda name: name.endswith(SUFFIX)) -> None:

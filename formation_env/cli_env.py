@@ -57,15 +57,10 @@ def show(scenario: Env) -> None:
 def to_yaml(scenario: "Scenario") -> str:
     """A scenario as a YAML file that loads as an equal one."""
     from dataclasses import asdict
-    from io import StringIO
 
-    from ruamel.yaml import YAML
+    from formation_env.configuration.config_files import dump_yaml
 
-    yaml, stream = YAML(typ="safe", pure=True), StringIO()
-    yaml.default_flow_style, yaml.sort_base_mapping_type_on_output = False, False  # type: ignore[assignment]
-    yaml.width = 120
-    yaml.dump(_plain(asdict(scenario)), stream)
-    return stream.getvalue()
+    return dump_yaml(_plain(asdict(scenario)), inline=False)
 
 
 def _plain(value: object) -> object:

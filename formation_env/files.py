@@ -1,11 +1,12 @@
-"""Reading of regular files only, and writing of files that are either complete or not there."""
+"""Reading and hashing of regular files, and writing of files that are either complete or not there."""
 
 import contextlib
 import errno
+import hashlib
 import os
 import stat
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 
@@ -30,6 +31,14 @@ def read_regular_file(path: Path, max_bytes: int) -> bytes:
     if len(content) > max_bytes:
         raise OSError(errno.EFBIG, f"larger than {max_bytes:,} bytes", str(path))
     return content
+
+
+def hash_sources(paths: Iterable[Path]) -> str:
+    """SHA-256 over the names and contents of files, hexadecimal."""
+    total = hashlib.sha256()
+    for path in paths:
+        total.update(path.name.encode() + b"\0" + hashlib.sha256(path.read_bytes()).digest())
+    return total.hexdigest()
 
 
 @contextlib.contextmanager

@@ -7,7 +7,6 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, Protocol
 
-from baselines import result_cache
 from baselines.controllers.policy import AccelerationPolicy
 from baselines.controllers.registry import (
     POLICIES,
@@ -18,6 +17,7 @@ from baselines.controllers.registry import (
     settings_path,
 )
 from formation_env.evaluation.rollout import Policy
+from formation_env.files import hash_sources
 from formation_env.task.loading import load_scenario
 from formation_env.task.scenario import Scenario
 
@@ -112,6 +112,6 @@ def _module_hash(module: str) -> str:
     """Hash of the sources of a module's package, or of the module itself if it is in none."""
     package = sys.modules.get(module.partition(".")[0])
     if package is not None and getattr(package, "__path__", None):
-        return result_cache.hash_sources(path for root in package.__path__ for path in sorted(Path(root).rglob("*.py")))
+        return hash_sources(path for root in package.__path__ for path in sorted(Path(root).rglob("*.py")))
     file = getattr(sys.modules.get(module), "__file__", None)
-    return "" if file is None else result_cache.hash_sources([Path(file)])
+    return "" if file is None else hash_sources([Path(file)])

@@ -1,10 +1,10 @@
 """Settings files with comments, section by section."""
 
 import re
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
+from formation_env.configuration.config_files import dump_yaml
 from formation_env.files import write_texts
 
 
@@ -27,13 +27,7 @@ def write_section(path: Path, policy: str, settings: dict[str, Any], comment: st
 
 def commented(data: dict[str, Any], comment: str) -> str:
     """YAML with a comment above it."""
-    from ruamel.yaml import YAML
-
-    yaml, stream = YAML(typ="safe", pure=True), StringIO()
-    yaml.default_flow_style, yaml.sort_base_mapping_type_on_output = None, False  # type: ignore[assignment]
-    yaml.width = 120
-    yaml.dump(data, stream)
-    return "".join(f"# {line}\n" for line in comment.splitlines()) + stream.getvalue()
+    return "".join(f"# {line}\n" for line in comment.splitlines()) + dump_yaml(data, inline=True)
 
 
 def replace_section(text: str, policy: str, new: str) -> str:

@@ -1,4 +1,4 @@
-"""Reading of YAML and JSON files from anywhere: every fault is one clear line, and none takes long."""
+"""Reading of YAML and JSON files: every fault is one clear line, and none takes long; and writing of YAML."""
 
 import json
 from pathlib import Path
@@ -28,6 +28,25 @@ def load_yaml(path: Path) -> Any:
         return yaml_loader.load(_read(path, "YAML"))
     except YAMLError as error:
         raise ConfigError(f"{path}: {yaml_loader.describe(error)}") from None
+
+
+def dump_yaml(data: Any, *, inline: bool) -> str:
+    """Plain data as YAML text, keys in their order.
+
+    Args:
+        data: nested dicts, lists and scalars.
+        inline: whether mappings and lists of scalars stand on one line, in braces and brackets.
+    """
+    from io import StringIO
+
+    from ruamel.yaml import YAML
+
+    yaml, stream = YAML(typ="safe", pure=True), StringIO()
+    yaml.default_flow_style = None if inline else False
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    yaml.width = 120
+    yaml.dump(data, stream)
+    return stream.getvalue()
 
 
 def load_json(path: Path) -> Any:

@@ -1,6 +1,5 @@
 """The compiled step and reset over all tiles."""
 
-import hashlib
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -8,6 +7,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from formation_env.files import hash_sources
 from formation_env.kernel import packing, unpacking, variants
 from formation_env.kernel import tile as field
 from formation_env.kernel.stages import kalman_filter, memory, noise, observe, reward, start, thruster, true_motion
@@ -191,5 +191,4 @@ def _source_hash() -> int:
     """Hash of all source files that the compiled code comes from."""
     package = Path(__file__).parents[1]
     paths = sorted(path for pattern in COMPILED_SOURCES for path in package.glob(pattern))
-    digest = hashlib.sha256(b"".join(path.read_bytes() for path in paths))
-    return int.from_bytes(digest.digest()[:7])
+    return int(hash_sources(paths)[:14], 16)  # 56 bits: numba knows integers of 64

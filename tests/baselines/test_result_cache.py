@@ -15,6 +15,7 @@ import pytest
 
 from baselines import result_cache
 from baselines.result_cache import SUFFIX, Entry, entry, remove_temporaries
+from formation_env.files import hash_sources
 
 ARRAYS = {
     "cost": np.array([1 / 3, np.nan, -1e-300, np.inf]),
@@ -164,8 +165,8 @@ def test_the_source_hash_sees_the_content(tmp_path: Path) -> None:
     hashes = set()
     for text in ("x = 1\n", "x = 2\n"):
         file.write_text(text)
-        hashes.add(result_cache.hash_sources([file]))
-    hashes.add(result_cache.hash_sources([file.rename(tmp_path / "b.py")]))
+        hashes.add(hash_sources([file]))
+    hashes.add(hash_sources([file.rename(tmp_path / "b.py")]))
     assert len(hashes) == 3
     code = "from baselines.result_cache import source_hash; print(source_hash())"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
