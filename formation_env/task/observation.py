@@ -122,7 +122,7 @@ class ObservationLayout:
         Returns:
             States (..., 6).
         """
-        block: Array = observation[..., SLICES[name]].astype(np.float64) * self.state_scale
+        block: Array = observation[..., SLICES[name]] * self.state_scale
         return block
 
     def estimate(self, observation: NDArray[np.floating]) -> Array:
