@@ -4,15 +4,14 @@ from typing import Literal
 
 import numpy as np
 
-from baselines.controllers.policy import AccelerationPolicy
+from baselines.controllers.few_burns import FewBurns
+from baselines.controllers.lookup import look_up
 from baselines.controllers.search_space import CORRECTION, STATION_KEEPING, Parameter
-from baselines.design.guidance import Guidance
-from baselines.design.mid_course_correction import CorrectionSettings, MidCourse
+from baselines.design.mid_course_correction import CorrectionSettings
 from baselines.design.phase_tables import by_steps_left
-from baselines.design.station_keeping import StationKeeping, StationKeepingSettings
+from baselines.design.station_keeping import StationKeepingSettings
 from formation_env.numerics.arrays import Array, Observations
 from formation_env.settings import NonNegative, settings
-from formation_env.task.observation import observation_layout
 from formation_env.task.scenario import Scenario
 
 
@@ -33,7 +32,7 @@ class DeadbandSettings:
     station_keeping: StationKeepingSettings = StationKeepingSettings()
 
 
-class Deadband(AccelerationPolicy):
+class Deadband(FewBurns):
     """In a transfer the path's own thrust and corrections of the miss at its end; in a hold rare impulses."""
 
     name = "deadband"
@@ -43,24 +42,17 @@ class Deadband(AccelerationPolicy):
     color, symbol, dash = "#9A7B2C", "pentagon", "dash"
 
     def __init__(self, scenario: Scenario, settings: DeadbandSettings) -> None:
-        super().__init__(scenario, settings)
-        self._layout = observation_layout(scenario)
-        self._guidance = Guidance(scenario, settings.guidance)
-        self._course = MidCourse(scenario, settings.correction)
-        self._station_keeping = StationKeeping(scenario, settings.station_keeping)
+        super().__init__(scenario, settings, settings.guidance, settings.correction, settings.station_keeping)
         model = scenario.filter_dynamics()
         to_accel = by_steps_left(scenario, lambda leg: np.linalg.pinv(model.steps(leg.start, leg.end).Gamma))
         own = (to_accel @ self._guidance.residuals[..., None])[..., 0]
         least = settings.least_thrust * scenario.spacecraft.max_accel_m_s2
         self._own_thrust = np.where(np.linalg.norm(own, axis=-1, keepdims=True) >= least, own, 0.0)
 
-    def acceleration(self, observation: Observations) -> Array:
-        """Accelerations (..., 3), m/s^2."""
+    def transfer(self, observation: Observations) -> Array:
+        """Accelerations (rows, 3), m/s^2, not cut to the limit."""
         now = self._guidance.track(observation)
-        in_hold = self._layout.scalar(observation, "in_hold") > 0.5
         miss = (self._course.coast(now.at) @ now.error[..., None])[..., :3, 0]
         off = self._course.is_off(miss, observation, now.at)
         impulse = np.where(off[..., None], self._course.impulse(miss, now.at), 0.0)
-        transfer = self._own_thrust[now.at] + impulse / self.scenario.dt_s
-        hold = self._station_keeping.acceleration(now.error, now.at)
-        return self.within_limit(np.where(in_hold[..., None], hold, transfer))
+        return look_up(self._own_thrust, now.at) + impulse / self.scenario.dt_s

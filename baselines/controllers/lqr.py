@@ -7,11 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Strict, model_validator
 
+from baselines.controllers.affine_law import AffineLaw, reference_table, shown
+from baselines.controllers.lookup import look_up_times
 from baselines.controllers.policy import AccelerationPolicy
 from baselines.controllers.search_space import REWEIGHTED_LQG, Parameter
 from baselines.controllers.weights import Weights
-from baselines.design.guidance import Guidance, GuidanceName, Tracking, desired_path
-from baselines.design.phase_tables import by_steps_left, nominal_start
+from baselines.design.guidance import Guidance, GuidanceName, desired_path
+from baselines.design.phase_tables import Instants, by_steps_left, nominal_start
 from baselines.design.reweighted_lqg import PhaseDesign, ReweightedLQGSettings, reweighted_design
 from baselines.design.riccati import finite_horizon_gains, least_fuel_gains, stationary
 from formation_env.numerics.arrays import Array, Observations
@@ -83,26 +85,27 @@ class LQR(AccelerationPolicy):
 
     def __init__(self, scenario: Scenario, settings: LQRSettings) -> None:
         super().__init__(scenario, settings)
-        self._guidance = Guidance(scenario, settings.guidance)
+        guidance = Guidance(scenario, settings.guidance)
         model = scenario.filter_dynamics()
         if settings.deadband > 0:
             self._stiffness = by_steps_left(scenario, lambda leg: _design(scenario, settings)[leg.index].stiffness)
         self.K = by_steps_left(scenario, lambda leg: phase_gains(scenario, leg, settings))
         to_accel = by_steps_left(scenario, lambda leg: np.linalg.pinv(model.steps(leg.start, leg.end).Gamma))
-        self._own_thrust = settings.feedforward * (to_accel @ self._guidance.residuals[..., None])[..., 0]
+        own_thrust = settings.feedforward * (to_accel @ guidance.residuals[..., None])[..., 0]
+        self._law = AffineLaw(scenario, self.K, guidance.desired - reference_table(scenario), own_thrust)
 
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
-        now = self._guidance.track(observation)
-        acceleration: Array = self._own_thrust[now.at] - (self.K[now.at] @ now.error[..., None])[..., 0]
-        return np.where(self._pays(acceleration, now)[..., None], acceleration, 0.0)
-
-    def _pays(self, acceleration: Array, now: Tracking) -> NDArray[np.bool_]:
-        """Whether an acceleration (..., 3) reduces the cost to come, per delta-v, by more than the deadband."""
+        at = self._law.instants(observation)
+        acceleration = self._law.acceleration(shown(observation, "error"), at)
         if self.settings.deadband == 0:
-            return np.ones(acceleration.shape[:-1], bool)
-        slope = (self._stiffness[now.at] @ acceleration[..., None])[..., 0]
-        return np.asarray(np.linalg.norm(slope, axis=-1) > self.settings.deadband * self.scenario.dt_s)
+            return acceleration
+        return np.where(self._pays(acceleration, at)[..., None], acceleration, 0.0)
+
+    def _pays(self, acceleration: Array, at: Instants) -> NDArray[np.bool_]:
+        """Whether an acceleration (..., 3) reduces the cost to come, per delta-v, by more than the deadband."""
+        slope = look_up_times(self._stiffness, at, acceleration)
+        return np.asarray(np.vecdot(slope, slope) > (self.settings.deadband * self.scenario.dt_s) ** 2)
 
 
 def phase_gains(scenario: Scenario, leg: Leg, settings: LQRSettings) -> Array:

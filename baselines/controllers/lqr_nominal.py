@@ -3,18 +3,16 @@
 from dataclasses import replace
 from functools import lru_cache
 
-import numpy as np
-
+from baselines.controllers.affine_law import AffineLaw, shown
 from baselines.controllers.policy import AccelerationPolicy
 from baselines.controllers.search_space import REWEIGHTED_LQG
-from baselines.design.phase_tables import by_steps_left, read_instants
+from baselines.design.phase_tables import by_steps_left
 from baselines.design.reweighted_lqg import ReweightedLQGSettings, reweighted_gains
 from baselines.optimal import OptimalPlan, fuel_optimal
 from baselines.optimal.cone_solver import SOLVER
 from formation_env.dynamics.perturbations import Perturbations
 from formation_env.numerics.arrays import Array, Observations
 from formation_env.settings import settings
-from formation_env.task.observation import observation_layout
 from formation_env.task.scenario import Scenario
 
 
@@ -50,19 +48,15 @@ class LQRNominal(AccelerationPolicy):
             ModuleNotFoundError: Clarabel is not installed.
         """
         super().__init__(scenario, settings)
-        self._layout = observation_layout(scenario)
         plan, K = mission_plan(scenario), reweighted_gains(scenario, settings.reweighted_lqg)
-        self._path = by_steps_left(scenario, lambda leg: plan.states[leg.start : leg.end])
-        self._thrust = by_steps_left(scenario, lambda leg: plan.controls[leg.start : leg.end])
-        self._K = by_steps_left(scenario, lambda leg: K[leg.index])
+        path = by_steps_left(scenario, lambda leg: plan.states[leg.start : leg.end])
+        thrust = by_steps_left(scenario, lambda leg: plan.controls[leg.start : leg.end])
+        self._law = AffineLaw(scenario, by_steps_left(scenario, lambda leg: K[leg.index]), path, thrust)
 
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
-        phase, steps_left = read_instants(observation, self._layout, self.scenario.dt_s)
-        at = phase, np.clip(steps_left, 0, self._path.shape[1] - 1)
-        off = self._layout.estimate(observation) - self._path[at]
-        acceleration: Array = self._thrust[at] - (self._K[at] @ off[..., None])[..., 0]
-        return acceleration
+        estimate = shown(observation, "error") + shown(observation, "reference")
+        return self._law.acceleration(estimate, self._law.instants(observation))
 
 
 @lru_cache(maxsize=32)

@@ -5,10 +5,11 @@ from typing import Literal
 
 import numpy as np
 
+from baselines.controllers.affine_law import AffineLaw, reference_table, shown
 from baselines.controllers.policy import AccelerationPolicy
 from baselines.controllers.search_space import REGULATOR
 from baselines.controllers.weights import Weights
-from baselines.design.guidance import Guidance, GuidanceName, desired_states
+from baselines.design.guidance import GuidanceName, desired_states
 from baselines.design.phase_tables import by_steps_left
 from baselines.design.riccati import continuous_gain, integrate_tracking
 from formation_env.dynamics import get_dynamics
@@ -49,17 +50,15 @@ class LQRQuasiStatic(AccelerationPolicy):
 
     def __init__(self, scenario: Scenario, settings: LQRQuasiStaticSettings) -> None:
         super().__init__(scenario, settings)
-        self._guidance = Guidance(scenario, settings.guidance)
         parts = {leg: leg_gains(scenario, leg, settings) for leg in legs(scenario)}
         self.K = by_steps_left(scenario, lambda leg: parts[leg][0])
         pull = by_steps_left(scenario, lambda leg: parts[leg][1])
-        # u = pull - K x with x = y_d + e
-        self._own_thrust = pull - (self.K @ self._guidance.desired[..., None])[..., 0]
+        # u = pull - K (y_r + e), with the reference y_r and the error e from it
+        self._law = AffineLaw(scenario, self.K, -reference_table(scenario), pull)
 
     def acceleration(self, observation: Observations) -> Array:
         """Accelerations (..., 3), m/s^2."""
-        now = self._guidance.track(observation)
-        return self._own_thrust[now.at] - (self.K[now.at] @ now.error[..., None])[..., 0]
+        return self._law.acceleration(shown(observation, "error"), self._law.instants(observation))
 
 
 def leg_gains(scenario: Scenario, leg: Leg, settings: LQRQuasiStaticSettings) -> tuple[Array, Array]:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from baselines.controllers.lookup import look_up, look_up_times
 from baselines.controllers.policy import AccelerationPolicy
 from baselines.controllers.reaching import AnyReaching, ExponentialReaching, Relay
 from baselines.controllers.search_space import Parameter
@@ -65,10 +66,10 @@ class SMC(AccelerationPolicy):
         if isinstance(reaching, Relay):
             return reaching.u0_m_s2 * self.sign(s)
         # Ce x_d(k+1) - Ce Phi x(k) = Ce residual - Ce Phi (x - x_d): the path's own thrust, and the error's free motion
-        free = self._path[now.at] - (self._Ce_Phi[now.at] @ now.error[..., None])[..., 0]
+        free = look_up(self._path, now.at) - look_up_times(self._Ce_Phi, now.at, now.error)
         # s(k+1) by the reaching law (eq. 4.56)
         following = s + reaching.change(s, self.sign(s), self.scenario.dt_s)
-        return np.asarray((self._inverse[now.at] @ (free - following)[..., None])[..., 0])
+        return look_up_times(self._inverse, now.at, free - following)
 
     def sign(self, s: Array) -> Array:
         """Sgn s (..., 3), or sat(s / Delta) with a boundary layer."""

@@ -2,14 +2,12 @@
 
 import numpy as np
 
-from baselines.controllers.policy import AccelerationPolicy
+from baselines.controllers.few_burns import FewBurns
 from baselines.controllers.search_space import CORRECTION, STATION_KEEPING, Parameter
-from baselines.design.guidance import Guidance
-from baselines.design.mid_course_correction import CorrectionSettings, MidCourse
-from baselines.design.station_keeping import StationKeeping, StationKeepingSettings
+from baselines.design.mid_course_correction import CorrectionSettings
+from baselines.design.station_keeping import StationKeepingSettings
 from formation_env.numerics.arrays import Array, Observations
 from formation_env.settings import NonNegative, settings
-from formation_env.task.observation import observation_layout
 from formation_env.task.scenario import Scenario
 
 _LEAST_BURN_STEPS = 1.01
@@ -31,7 +29,7 @@ class TwoImpulseSettings:
     station_keeping: StationKeepingSettings = StationKeepingSettings()
 
 
-class TwoImpulsePolicy(AccelerationPolicy):
+class TwoImpulsePolicy(FewBurns):
     """In a transfer the impulse that leads to the goal, later the one that stops there; each as a burn at the limit.
 
     It has no plan in memory: the estimate's zero-effort miss gives what is left of an impulse.
@@ -44,23 +42,17 @@ class TwoImpulsePolicy(AccelerationPolicy):
     color, symbol = "#CC79A7", "triangle-down"
 
     def __init__(self, scenario: Scenario, settings: TwoImpulseSettings) -> None:
-        super().__init__(scenario, settings)
-        self._layout = observation_layout(scenario)
-        self._guidance = Guidance(scenario, "automatic")
-        self._course = MidCourse(scenario, settings.correction)
-        self._station_keeping = StationKeeping(scenario, settings.station_keeping)
+        super().__init__(scenario, settings, "automatic", settings.correction, settings.station_keeping)
 
-    def acceleration(self, observation: Observations) -> Array:
-        """Accelerations (..., 3), m/s^2, along the impulse even at the limit."""
+    def transfer(self, observation: Observations) -> Array:
+        """Accelerations (rows, 3), m/s^2, not cut to the limit."""
         now = self._guidance.track(observation)
-        in_hold = self._layout.scalar(observation, "in_hold") > 0.5
         arrival = self._layout.state(observation, "zero_effort_miss")
         first = self._course.impulse(arrival[..., :3], now.at)
         off = self._course.is_off(arrival[..., :3], observation, now.at)
         brakes = self._layout.time_to_arrival_s(observation) <= self._braking_s(arrival[..., 3:])
-        transfer = np.where(brakes[..., None], -arrival[..., 3:], np.where(off[..., None], first, 0.0))
-        hold = self._station_keeping.acceleration(now.error, now.at)
-        return self.within_limit(np.where(in_hold[..., None], hold, transfer / self.scenario.dt_s))
+        impulse = np.where(brakes[..., None], -arrival[..., 3:], np.where(off[..., None], first, 0.0))
+        return impulse / self.scenario.dt_s
 
     def _braking_s(self, velocity_m_s: Array) -> Array:
         """Lead time (...) of the burn against a velocity (..., 3) before the arrival, s; at least a step."""
