@@ -14,7 +14,8 @@ from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
-from formation_env.kernel.simulation import ALL_ROWS, Rows, Simulation
+from formation_env.kernel.results import StepResults
+from formation_env.kernel.simulation import Simulation
 from formation_env.numerics.arrays import Array
 from formation_env.task import observation
 from formation_env.task.scenario import Scenario
@@ -22,7 +23,7 @@ from formation_env.task.scenario import Scenario
 P = ParamSpec("P")
 
 INFO_STATES: Final = ("true_state", "estimate")
-"""Info keys that are parts of the simulation's state by the same name."""
+"""Info keys that are results of the simulation by the same name."""
 INFO_THRUST: Final = "accel_m_s2"
 
 
@@ -70,9 +71,31 @@ def info_scalars(scenario: Scenario) -> dict[str, Scalar]:
     return INFO_SCALARS if scenario.domain_randomization is None else INFO_SCALARS | INFO_VARIANT
 
 
-def analysis_infos(simulation: Simulation, rows: Rows = ALL_ROWS) -> dict[str, Array]:
-    """Infos of an environment made with `analysis=True`, each (rows, ...): see `StepNoises`."""
-    return simulation.step_noises(rows)._asdict()
+def infos_of(results: StepResults, scenario: Scenario, analysis: bool) -> dict[str, NDArray[Any]]:
+    """Infos of a step or a reset, each (rows,) or (rows, size): views of its results.
+
+    Args:
+        results: of the step or the reset.
+        scenario: the scenario.
+        analysis: whether the step's noises are among them, see `FormationEnv`.
+    """
+    infos = {name: results[name] for name in INFO_STATES}
+    infos[INFO_THRUST] = results["thrust"]
+    infos |= {name: results[result] for name, (result, _) in info_scalars(scenario).items()}
+    if analysis:
+        measured = 3 if scenario.sensor.measures == "position" else 6
+        infos |= {name: results[name][:, :measured] for name in ("measurement", "innovation")}
+        infos |= {"process_noise_m_s2": results["process_noise"], "thrust_noise": results["thrust_noise"]}
+    return infos
+
+
+def with_masks(infos: dict[str, Any], mask: NDArray[np.bool_]) -> dict[str, Any]:
+    """Infos, and the rows that have them by the same name with an underscore, as Gymnasium wants it; one array."""
+    with_masks = {}
+    for name, value in infos.items():
+        with_masks[name] = value
+        with_masks[f"_{name}"] = mask
+    return with_masks
 
 
 def with_length(spec: EnvSpec | None, max_episode_steps: int) -> EnvSpec | None:

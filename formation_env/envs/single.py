@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 from formation_env.envs import interface
 from formation_env.kernel.metrics import episode_metrics
-from formation_env.kernel.simulation import RESULT_PLACES, Simulation
+from formation_env.kernel.simulation import Simulation
+from formation_env.kernel.tile import FLAGS, INTEGERS, RESULTS
+from formation_env.numerics.arrays import Array
 from formation_env.rendering.modes import FRAMES_PER_S, RENDER_MODES
 from formation_env.task.loading import load_scenario
 from formation_env.task.scenario import Scenario
@@ -19,9 +21,14 @@ from formation_env.task.scenario import Scenario
 Observation = NDArray[np.float32]
 
 _ONLY_ROW = np.zeros(1, np.intp)
-_REWARD, _TERMINATED, _TRUNCATED, _THRUST = (
-    RESULT_PLACES[name] for name in ("reward", "terminated", "truncated", "thrust")
-)
+# Places of the results, looked up once.
+_TRUE_STATE = slice(RESULTS.true_state, RESULTS.true_state + 6)
+_ESTIMATE = slice(RESULTS.estimate, RESULTS.estimate + 6)
+_THRUST = slice(RESULTS.thrust, RESULTS.thrust + 3)
+_NUMBERS = slice(RESULTS.position_error, RESULTS.reward)
+_REWARD = RESULTS.reward
+_MEASURED, _TERMINATED, _TRUNCATED = FLAGS
+_PHASE, _VARIANT = INTEGERS
 
 
 class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -45,7 +52,8 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             scenario: a name, a path of a YAML file, or a Scenario.
             render_mode: None, `rgb_array` or `human`.
             analysis: whether infos also hold the simulated `measurement` (whether or not it was received, which
-                `measured` tells), `process_noise_m_s2` and `thrust_noise`, see `kernel.simulation.StepNoises`.
+                `measured` tells), its `innovation` (measurement minus prediction), `process_noise_m_s2` and
+                `thrust_noise`, see `kernel.tile.Noises`.
 
         Raises:
             ConfigError: the scenario is wrong.
@@ -58,10 +66,9 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.render_mode = render_mode
         self.action_space = interface.action_space()
         self.observation_space = interface.observation_space()
-        self.simulation = Simulation(self.scenario, 1)
-        scalars = interface.info_scalars(self.scenario)
-        self._info_scalars = [(name, RESULT_PLACES[result], kind) for name, (result, kind) in scalars.items()]
+        self.simulation = Simulation(self.scenario, 1, with_noises=analysis)
         self._analysis = analysis
+        self._varied = self.scenario.domain_randomization is not None
         self._keyed = False
         self._renderer: Any = None
         self._trail: Any = None
@@ -101,13 +108,16 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             self.simulation.seed(0, self.np_random)
             self._keyed = True
         observations = self.simulation.new_observations()
+        self.simulation.new_results(_ONLY_ROW)
         self.simulation.reset(_ONLY_ROW, observations, starts)
         if self._renderer is not None:
             self._renderer.restart()
         if self._trail is not None:
             self._trail.clear()
             self._show()
-        return observations[0], self._info(self.simulation.first_row_results())
+        results = self.simulation.results
+        values = results.values[:, 0]
+        return observations[0], self._info(values, values.tolist(), results.flags.tolist())
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Fly one step.
@@ -126,24 +136,44 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         simulation.actions[0] = action
         observations = simulation.new_observations()
         simulation.step(observations)
-        values = simulation.first_row_results()
-        info = self._info(values)
-        terminated, truncated = values[_TERMINATED] > 0.5, values[_TRUNCATED] > 0.5
+        results = simulation.results
+        values, flags = results.values[:, 0], results.flags.tolist()
+        numbers = values.tolist()
+        info = self._info(values, numbers, flags)
+        terminated, truncated = flags[_TERMINATED][0], flags[_TRUNCATED][0]
         if terminated or truncated:
             info[interface.TOTALS] = {name: float(value[0]) for name, value in episode_metrics(simulation).items()}
         if self._trail is not None:
             self._show()
-        return observations[0], values[_REWARD], terminated, truncated, info
+        return observations[0], numbers[_REWARD], terminated, truncated, info
 
-    def _info(self, values: list[float]) -> dict[str, Any]:
-        """Info of the last step, from the results of the one row."""
-        simulation = self.simulation
-        info: dict[str, Any] = {name: simulation.first_row_state(name) for name in interface.INFO_STATES}
-        info[interface.INFO_THRUST] = np.array(values[_THRUST : _THRUST + 3])
-        for name, place, kind in self._info_scalars:
-            info[name] = kind(values[place])
+    def _info(self, values: Array, numbers: list[float], flags: list[list[bool]]) -> dict[str, Any]:
+        """Info of the last step or reset: the vectors are views of its results.
+
+        Args:
+            values: results (NUM_RESULTS,).
+            numbers: the same as Python numbers.
+            flags: its flags, a list of one each.
+        """
+        results = self.simulation.results
+        error_m, delta_v, error_cost, exit_cost, nis = numbers[_NUMBERS]
+        info: dict[str, Any] = {
+            "true_state": values[_TRUE_STATE],
+            "estimate": values[_ESTIMATE],
+            "accel_m_s2": values[_THRUST],
+            "position_error_m": error_m,
+            "delta_v_m_s": delta_v,
+            "error_cost_m_s": error_cost,
+            "exit_cost_m_s": exit_cost,
+            "nis": nis,
+            "measured": flags[_MEASURED][0],
+            "phase": results.integers.item(_PHASE),
+        }
+        if self._varied:
+            info["variant"] = results.integers.item(_VARIANT)
         if self._analysis:
-            info |= {name: value[0] for name, value in interface.analysis_infos(simulation).items()}
+            every = interface.infos_of(results, self.scenario, True)
+            info |= {name: every[name][0] for name in every if name not in info}
         return info
 
     def _show(self) -> None:

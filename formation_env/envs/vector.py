@@ -13,8 +13,9 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from formation_env.envs import interface
-from formation_env.kernel.metrics import episode_metrics
-from formation_env.kernel.simulation import ALL_ROWS, Rows, Simulation
+from formation_env.kernel.metrics import METRICS, episode_metrics
+from formation_env.kernel.results import StepResults
+from formation_env.kernel.simulation import Simulation
 from formation_env.task.loading import load_scenario
 from formation_env.task.scenario import Scenario
 
@@ -22,6 +23,7 @@ Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 
 MASK_OPTION: Final = "reset_mask"
+_NO_ROWS: Final = np.empty(0, np.intp)
 
 
 class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
@@ -73,9 +75,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self.single_observation_space = interface.observation_space()
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.simulation = Simulation(self.scenario, num_envs)
-        self._info_scalars = interface.info_scalars(self.scenario)
-        self._observations = self.simulation.new_observations()
+        self.simulation = Simulation(self.scenario, num_envs, with_noises=analysis)
         self._analysis = analysis
         self._keyed = False
         self._waiting = np.empty(0, np.intp)  # rows that ended and are not reset yet
@@ -112,9 +112,13 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         if isinstance(seeds, range):
             self._np_random, self._np_random_seed = gymnasium.utils.seeding.np_random(seeds.start)
         self._seed(seeds, rows)
-        self.simulation.reset(rows, self._observations, None if starts is None else starts[rows])
+        observations = self.simulation.new_observations()
+        if len(rows) < self.num_envs:
+            self.simulation.look(observations)
+        self.simulation.new_results(rows)
+        self.simulation.reset(rows, observations, None if starts is None else starts[rows])
         self._waiting = np.setdiff1d(self._waiting, rows)
-        return self._observations.copy(), self._infos(rows if len(rows) < self.num_envs else slice(None))
+        return observations, self._infos(None if len(rows) == self.num_envs else rows)
 
     def _rows(self, mask: Any) -> NDArray[np.intp]:
         """Indices of the rows to reset: all, or those of a mask."""
@@ -148,22 +152,25 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self._check_ready()
         simulation = self.simulation
         simulation.actions[:] = actions
-        simulation.step(self._observations)
-        waiting = len(self._waiting) > 0
-        if waiting:  # a reset overwrites the rows' step, and clears their flags
-            simulation.reset(self._waiting, self._observations)
-        rewards = simulation.read("reward")
-        if waiting:
-            rewards[self._waiting] = 0.0
-        terminations, truncations = simulation.read("terminated", dtype=bool), simulation.read("truncated", dtype=bool)
-        complete = ended = np.flatnonzero(terminations | truncations)
+        observations = simulation.new_observations()
+        num_ended = simulation.step(observations)
+        if len(self._waiting):  # they begin in this step; what they flew is overwritten
+            simulation.reset(self._waiting, observations)
+            simulation.forget_ends(self._waiting)
+        results = simulation.results
+        rewards, terminations, truncations = (results[name] for name in ("reward", "terminated", "truncated"))
+        ended = complete = _NO_ROWS
+        if num_ended:
+            ended = complete = np.flatnonzero(terminations | truncations)
         if self._is_cut:
             truncations |= simulation.read("step") >= self.max_episode_steps
             ended = np.flatnonzero(terminations | truncations)
-        finals = self._end(ended, complete) if len(ended) else {}
+        finals = self._end(observations, ended, complete) if len(ended) else {}
         if self.autoreset_mode is not AutoresetMode.SAME_STEP:
             self._waiting = ended
-        return self._observations.copy(), rewards, terminations, truncations, {**self._infos(), **finals}
+        infos = self._infos()
+        infos.update(finals)
+        return observations, rewards, terminations, truncations, infos
 
     def _check_ready(self) -> None:
         """Refuse a step that needs a reset before it."""
@@ -175,48 +182,45 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
                 f"step: rows {rows} have ended; reset them with options={{'{MASK_OPTION}': mask}}"
             )
 
-    def _end(self, ended: NDArray[np.intp], complete: NDArray[np.intp]) -> dict[str, Any]:
+    def _end(self, observations: Observations, ended: NDArray[np.intp], complete: NDArray[np.intp]) -> dict[str, Any]:
         """Infos of rows that ended, those of a complete plan with its totals; with SAME_STEP they are reset."""
         totals = self._totals(complete) if len(complete) else {}
-        return self._begin_next(ended, totals) if self.autoreset_mode is AutoresetMode.SAME_STEP else totals
+        return (
+            self._begin_next(observations, ended, totals) if self.autoreset_mode is AutoresetMode.SAME_STEP else totals
+        )
 
     def _totals(self, rows: NDArray[np.intp]) -> dict[str, Any]:
         """Totals of rows that flew to their episode's end, in Gymnasium's form."""
-        return self._spread({interface.TOTALS: self._spread(episode_metrics(self.simulation, rows), rows)}, rows)
+        columns = np.zeros((len(METRICS), self.num_envs))
+        columns[:, rows] = list(episode_metrics(self.simulation, rows).values())
+        mask = self._mask(rows)
+        totals = interface.with_masks(dict(zip(METRICS, columns, strict=True)), mask)
+        return {interface.TOTALS: totals, f"_{interface.TOTALS}": mask.copy()}
 
-    def _begin_next(self, ended: NDArray[np.intp], totals: dict[str, Any]) -> dict[str, Any]:
+    def _begin_next(
+        self, observations: Observations, ended: NDArray[np.intp], totals: dict[str, Any]
+    ) -> dict[str, Any]:
         """Reset the rows that ended; their last observations and infos, in Gymnasium's form."""
         final_info = self._infos(ended) | totals
         final_obs = np.full(self.num_envs, None, dtype=object)
-        for row in ended.tolist():
-            final_obs[row] = self._observations[row].copy()
-        self.simulation.reset(ended, self._observations)
-        finals = self._spread({"final_info": final_info}, ended)
-        return finals | {"final_obs": final_obs, "_final_obs": finals["_final_info"].copy()}
+        for row, observation in zip(ended.tolist(), observations[ended], strict=True):
+            final_obs[row] = observation
+        self.simulation.reset(ended, observations)
+        mask = self._mask(ended)
+        return {"final_info": final_info, "_final_info": mask, "final_obs": final_obs, "_final_obs": mask.copy()}
 
-    def _infos(self, rows: Rows = ALL_ROWS) -> dict[str, Any]:
-        """Infos of some rows of the last step, in Gymnasium's form."""
-        simulation = self.simulation
-        infos: dict[str, Any] = {name: simulation.read(name, rows) for name in interface.INFO_STATES}
-        infos[interface.INFO_THRUST] = simulation.read("thrust", rows)
-        for name, (result, kind) in self._info_scalars.items():
-            infos[name] = simulation.read(result, rows, kind)
-        if self._analysis:
-            infos |= interface.analysis_infos(simulation, rows)
-        return self._spread(infos, rows)
+    def _infos(self, rows: NDArray[np.intp] | None = None) -> dict[str, Any]:
+        """Infos of the last step or reset in Gymnasium's form, of all rows or zero but for some."""
+        results: StepResults = self.simulation.results
+        mask = np.ones(self.num_envs, bool) if rows is None else self._mask(rows)
+        shown = results if rows is None else results.only(rows)
+        return interface.with_masks(interface.infos_of(shown, self.scenario, self._analysis), mask)
 
-    def _spread(self, values: dict[str, Any], rows: Rows) -> dict[str, Any]:
-        """Values of some rows as arrays of all, zero elsewhere, each with a mask of the rows that have it."""
-        masks = np.zeros((len(values), self.num_envs), bool)
-        masks[:, rows] = True
-        spread: dict[str, Any] = {}
-        for (name, value), mask in zip(values.items(), masks, strict=True):
-            spread[name] = value
-            if not isinstance(value, dict) and not isinstance(rows, slice):
-                spread[name] = np.zeros((self.num_envs, *value.shape[1:]), value.dtype)
-                spread[name][rows] = value
-            spread[f"_{name}"] = mask
-        return spread
+    def _mask(self, rows: NDArray[np.intp]) -> Flags:
+        """Which rows are among some (num_envs,)."""
+        mask = np.zeros(self.num_envs, bool)
+        mask[rows] = True
+        return mask
 
 
 def _check_arguments(num_envs: int, render_mode: str | None, max_episode_steps: int | None) -> None:

@@ -124,9 +124,9 @@ def measure_first(
 ) -> tuple[State4, Symmetric4, float]:
     """Measurement update (eq. 4.71-4.73) with one measurement of the state's first element.
 
-    The measured element's row of the covariance takes Joseph's form, (I - K H) P (I - K H)' + K R_noise K', where
-    (I - K H) P would cancel; the rest is P - K H P, to which Joseph's form reduces for this gain. It is symmetric by
-    construction, and no variance becomes negative, see `LEAST_SHARE`.
+    For this gain the measured element's row of (I - K H) P is R_noise / (P + R_noise) times that of P, without a
+    difference; the rest is P - K H P. The result is symmetric by construction, and no variance becomes negative, see
+    `LEAST_SHARE`.
 
     A sensor without noise is always believed, also where the covariance of the element is 0 and eq. (4.71) divides zero
     by zero: its variance counts as `LEAST_VARIANCE`.
@@ -145,19 +145,23 @@ def measure_first(
     p00, p01, p02, p03, p11, p12, p13, p22, p23, p33 = P
     perfect = variance <= LEAST_VARIANCE
     variance = _at_least(variance, LEAST_VARIANCE)
-    s = p00 + variance
-    weight = received / s
+    weight = received / (p00 + variance)
     innovation = z - x0
-    # K = P H' / s
+    # K = P H' / s, and the share of the measured row that is left, R_noise / s
     k0 = received if perfect else p00 * weight
     k1, k2, k3 = p01 * weight, p02 * weight, p03 * weight
-    rest = 1.0 - k0
-    new_x = (x0 + k0 * innovation, x1 + k1 * innovation, x2 + k2 * innovation, x3 + k3 * innovation)
+    share = variance * weight + (1.0 - received)
+    new_x = (
+        fma(k0, innovation, x0),
+        fma(k1, innovation, x1),
+        fma(k2, innovation, x2),
+        fma(k3, innovation, x3),
+    )
     new_P = (
-        rest * rest * p00 + k0 * k0 * variance,
-        rest * (p01 - k1 * p00) + k0 * k1 * variance,
-        rest * (p02 - k2 * p00) + k0 * k2 * variance,
-        rest * (p03 - k3 * p00) + k0 * k3 * variance,
+        share * p00,
+        share * p01,
+        share * p02,
+        share * p03,
         _at_least(fma(-k1, p01, p11), LEAST_SHARE * p11),
         fma(-k1, p02, p12),
         fma(-k1, p03, p13),
@@ -169,54 +173,60 @@ def measure_first(
 
 
 @inline_scalar
-def measurement_update_4(
-    x_hat: State4, P: Symmetric4, z: State4, variances: tuple[float, float], received: tuple[float, float]
+def measure_pair_4(
+    x_hat: State4, P: Symmetric4, z: tuple[float, float], variance: float, received: float
 ) -> tuple[State4, Symmetric4, float]:
-    """Take the orbit plane's position, then velocity measurements.
+    """Take measurements of the state's first two elements, one after the other.
 
     Args:
-        x_hat: estimate (x, y, x', y').
+        x_hat: estimate (a, b, c, d).
         P: its covariance.
-        z: the measurements.
-        variances: of a position and of a velocity axis.
-        received: 1 or 0 for position and for velocity.
+        z: the measurements of a and b.
+        variance: of either.
+        received: 1 or 0.
 
     Returns:
         Estimate, covariance, normalised innovation squared.
     """
-    (x, y, u, v), (xx, xy, xu, xv, yy, yu, yv, uu, uv, vv), nis_x = measure_first(
-        x_hat, P, z[0], variances[0], received[0]
+    (a, b, c, d), (aa, ab, ac, ad, bb, bc, bd, cc, cd, dd), nis_a = measure_first(x_hat, P, z[0], variance, received)
+    (b, a, c, d), (bb, ab, bc, bd, aa, ac, ad, cc, cd, dd), nis_b = measure_first(
+        (b, a, c, d), (bb, ab, bc, bd, aa, ac, ad, cc, cd, dd), z[1], variance, received
     )
-    (y, x, u, v), (yy, xy, yu, yv, xx, xu, xv, uu, uv, vv), nis_y = measure_first(
-        (y, x, u, v), (yy, xy, yu, yv, xx, xu, xv, uu, uv, vv), z[1], variances[0], received[0]
-    )
-    (u, y, x, v), (uu, yu, xu, uv, yy, xy, yv, xx, xv, vv), nis_u = measure_first(
-        (u, y, x, v), (uu, yu, xu, uv, yy, xy, yv, xx, xv, vv), z[2], variances[1], received[1]
-    )
-    (v, y, u, x), (vv, yv, uv, xv, yy, yu, xy, uu, xu, xx), nis_v = measure_first(
-        (v, y, u, x), (vv, yv, uv, xv, yy, yu, xy, uu, xu, xx), z[3], variances[1], received[1]
-    )
-    return (x, y, u, v), (xx, xy, xu, xv, yy, yu, yv, uu, uv, vv), nis_x + nis_y + nis_u + nis_v
+    return (a, b, c, d), (aa, ab, ac, ad, bb, bc, bd, cc, cd, dd), nis_a + nis_b
 
 
 @inline_scalar
-def measurement_update_2(
-    x_hat: tuple[float, float],
-    P: Symmetric2,
-    z: tuple[float, float],
-    variances: tuple[float, float],
-    received: tuple[float, float],
+def measure_velocities_4(
+    x_hat: State4, P: Symmetric4, z: tuple[float, float], variance: float, received: float
+) -> tuple[State4, Symmetric4, float]:
+    """Take measurements of the last two elements of (x, y, x', y'), see `measure_pair_4`."""
+    x, y, u, v = x_hat
+    xx, xy, xu, xv, yy, yu, yv, uu, uv, vv = P
+    (u, v, x, y), (uu, uv, xu, yu, vv, xv, yv, xx, xy, yy), nis = measure_pair_4(
+        (u, v, x, y), (uu, uv, xu, yu, vv, xv, yv, xx, xy, yy), z, variance, received
+    )
+    return (x, y, u, v), (xx, xy, xu, xv, yy, yu, yv, uu, uv, vv), nis
+
+
+@inline_scalar
+def measure_first_2(
+    x_hat: tuple[float, float], P: Symmetric2, z: float, variance: float, received: float
 ) -> tuple[tuple[float, float], Symmetric2, float]:
-    """Take the cross-track position, then velocity measurement: `measure_first` with two of its states unused."""
-    p00, p01, p11 = P
-    (z0, v0, _, _), (p00, p01, _, _, p11, _, _, _, _, _), nis_z = measure_first(
+    """`measure_first` with two of its states unused."""
+    (a, b, _, _), (aa, ab, _, _, bb, _, _, _, _, _), nis = measure_first(
         (x_hat[0], x_hat[1], 0.0, 0.0),
-        (p00, p01, 0.0, 0.0, p11, 0.0, 0.0, 0.0, 0.0, 0.0),
-        z[0],
-        variances[0],
-        received[0],
+        (P[0], P[1], 0.0, 0.0, P[2], 0.0, 0.0, 0.0, 0.0, 0.0),
+        z,
+        variance,
+        received,
     )
-    (v0, z0, _, _), (p11, p01, _, _, p00, _, _, _, _, _), nis_v = measure_first(
-        (v0, z0, 0.0, 0.0), (p11, p01, 0.0, 0.0, p00, 0.0, 0.0, 0.0, 0.0, 0.0), z[1], variances[1], received[1]
-    )
-    return (z0, v0), (p00, p01, p11), nis_z + nis_v
+    return (a, b), (aa, ab, bb), nis
+
+
+@inline_scalar
+def measure_second_2(
+    x_hat: tuple[float, float], P: Symmetric2, z: float, variance: float, received: float
+) -> tuple[tuple[float, float], Symmetric2, float]:
+    """Take a measurement of the second of two elements."""
+    (b, a), (bb, ab, aa), nis = measure_first_2((x_hat[1], x_hat[0]), (P[2], P[1], P[0]), z, variance, received)
+    return (a, b), (aa, ab, bb), nis

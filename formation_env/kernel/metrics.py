@@ -131,7 +131,6 @@ def episode_metrics(simulation: Simulation, rows: Rows = ALL_ROWS) -> dict[str, 
 def _final_error(simulation: Simulation, rows: Rows, steps: Array) -> Array:
     """Position error at the end of the plan (rows,); an early end counts as staying at the distance limit."""
     error = simulation.read("position_error", rows)
-    plans = np.array([(each.num_steps, each.limits.max_distance_m) for each in simulation.variants])
-    num_steps, limit_m = plans[simulation.variant(rows)].T
+    num_steps, limit_m = simulation.plan_limits[simulation.variant(rows)].T
     early = simulation.read("terminated", rows, bool) & (steps < num_steps)
     return np.where(early, np.maximum(error, limit_m), error)

@@ -1,7 +1,4 @@
-"""A scenario as the compiled step sees it: one flat array of settings, and a table with what differs from step to step.
-
-`pack` writes the named tuples below one after the other; `unpack` reads them back inside the compiled step, as scalars.
-"""
+"""A scenario as the compiled step sees it: a line of `kernel.settings`, and tables of what differs by step."""
 
 from functools import lru_cache
 from typing import Final
@@ -11,57 +8,85 @@ import numpy as np
 from formation_env.dynamics import NONLINEAR, DiscreteModel
 from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE
 from formation_env.dynamics.nonlinear import leader_table, substeps
-from formation_env.kernel.unpacking import (
+from formation_env.kernel.settings import (
     FILTER,
     FORCES,
     SCALARS,
-    SENSOR,
     SIZE,
+    TRUTH,
     Forces,
     Model,
     ProcessNoise,
     Scalars,
-    SensorNoise,
 )
 from formation_env.navigation.filter_settings import process_noise_covariance, upper_triangle
-from formation_env.numerics.arrays import Array
-from formation_env.task.observation import observation_layout
+from formation_env.numerics.arrays import Array, Array32
+from formation_env.task.observation import BOUND, observation_layout
 from formation_env.task.scenario import Scenario
-from formation_env.task.schedule import build_schedule
+from formation_env.task.schedule import SCALES, build_schedule, column, columns
 
-# What the true motion is made of, and the filter's: compile-time constants.
-TIME_INVARIANT: Final = 0
-TIME_VARYING: Final = 1
-NONLINEAR_NEAR: Final = 2  # gravity and drag
-NONLINEAR_FAR: Final = 3  # Sun, Moon and radiation pressure, too
+CONSTANT: Final = "constant"
+VARYING: Final = "varying"
 
 
-def truth_kind(scenario: Scenario) -> int:
-    """Kind of the true motion."""
+def truth_kind(scenario: Scenario) -> str:
+    """Kind of the true motion: linear, `constant` or `varying`; or nonlinear, by `near` or also by `far` forces."""
     if scenario.dynamics == NONLINEAR:
-        return NONLINEAR_FAR if scenario.perturbations.far_bodies else NONLINEAR_NEAR
+        return "far" if scenario.perturbations.far_bodies else "near"
     return _linear_kind(scenario.true_dynamics())
 
 
-def filter_kind(scenario: Scenario) -> int:
-    """Whether the filter's model is the same at all steps."""
+def filter_kind(scenario: Scenario) -> str:
+    """Whether the filter's model is `constant` or `varying`."""
     return _linear_kind(scenario.filter_dynamics())
 
 
-def _linear_kind(model: DiscreteModel) -> int:
-    return TIME_VARYING if model.Phi.ndim == 3 else TIME_INVARIANT
+def _linear_kind(model: DiscreteModel) -> str:
+    return VARYING if model.Phi.ndim == 3 else CONSTANT
 
 
 @lru_cache(maxsize=2)
-def pack_variants(scenarios: tuple[Scenario, ...]) -> tuple[Array, Array]:
-    """Tables (variants, steps, columns), each as long as the longest by repeating its end; settings (variants, SIZE).
+def pack_variants(scenarios: tuple[Scenario, ...]) -> tuple[Array, Array32, Array]:
+    """What the compiled step reads of scenarios.
 
     The arrays are shared by all who ask for them; nobody writes into them.
+
+    Returns:
+        Tables (variants, steps, columns), each as long as the longest by repeating its end; what the observation shows
+        of them (variants, steps, NUM_SEEN), see `seen_table`; settings (variants, SIZE).
     """
     tables = [step_table(scenario) for scenario in scenarios]
+    seen = [seen_table(scenario, table) for scenario, table in zip(scenarios, tables, strict=True)]
+    return _stacked(tables), _stacked(seen).astype(np.float32), np.stack([pack(scenario) for scenario in scenarios])
+
+
+def _stacked(tables: list[Array]) -> Array:
     longest = max(len(table) for table in tables)
-    plans = np.stack([np.pad(table, ((0, longest - len(table)), (0, 0)), mode="edge") for table in tables])
-    return plans, np.stack([pack(scenario) for scenario in scenarios])
+    return np.stack([np.pad(table, ((0, longest - len(table)), (0, 0)), mode="edge") for table in tables])
+
+
+def seen_table(scenario: Scenario, plan: Array) -> Array:
+    """The elements of the observation that depend on the plan alone, from `reference` to `time_left`; `SCALES` behind.
+
+    Args:
+        scenario: the scenario.
+        plan: its table (num_steps + 1, columns).
+    """
+    layout = observation_layout(scenario)
+    shown = [
+        columns(plan, "reference") / layout.state_scale,
+        *(column(plan, name)[:, None] for name in ("time_to_arrival", "in_hold")),
+        column(plan, "phase")[:, None] / layout.num_phases,
+        column(plan, "time_left")[:, None],
+    ]
+    scales = {
+        "per_length": 1 / layout.length_m,
+        "per_speed": 1 / (layout.length_m * layout.mean_motion_rad_s),
+        "per_step": 1 / scenario.dt_s,
+        "per_log_age": 1 / np.log1p(layout.period_s / scenario.dt_s),
+    }
+    constant = np.broadcast_to([scales[name] for name in SCALES], (len(plan), len(SCALES)))
+    return np.hstack([np.clip(np.hstack(shown), -BOUND, BOUND), constant])
 
 
 def pack(scenario: Scenario) -> Array:
@@ -71,11 +96,10 @@ def pack(scenario: Scenario) -> Array:
         ValueError: a dynamics model couples the orbit plane and the cross-track axis.
     """
     settings = np.zeros(SIZE)
-    if truth_kind(scenario) == TIME_INVARIANT:
-        settings[:FILTER] = _model(scenario.true_dynamics())
-    if filter_kind(scenario) == TIME_INVARIANT:
-        settings[FILTER:SENSOR] = _filter(scenario)
-    settings[SENSOR:FORCES] = np.ravel(_sensor(scenario))
+    if truth_kind(scenario) == CONSTANT:
+        settings[TRUTH:FILTER] = _model(scenario.true_dynamics())
+    if filter_kind(scenario) == CONSTANT:
+        settings[FILTER:FORCES] = _filter(scenario)
     settings[FORCES:SCALARS] = _forces(scenario)
     settings[SCALARS:] = _scalars(scenario)
     return settings
@@ -88,11 +112,11 @@ def step_table(scenario: Scenario) -> Array:
     `Model`, if that varies, or the leader's path, if the truth is nonlinear.
     """
     columns = []
-    if filter_kind(scenario) == TIME_VARYING:
+    if filter_kind(scenario) == VARYING:
         columns.append(_filter(scenario))
-    if truth_kind(scenario) == TIME_VARYING:
+    if truth_kind(scenario) == VARYING:
         columns.append(_model(scenario.true_dynamics()))
-    elif truth_kind(scenario) != TIME_INVARIANT:
+    elif truth_kind(scenario) != CONSTANT:
         columns.append(leader_table(scenario.world, scenario.leader, scenario.dt_s, scenario.num_steps))
     plan = build_schedule(scenario)
     return np.hstack([plan, *(np.vstack([part[:1], part]) for part in columns)])
@@ -131,14 +155,6 @@ def _filter(scenario: Scenario) -> Array:
     return np.concatenate([_model(model), *noise], axis=-1)
 
 
-def _sensor(scenario: Scenario) -> SensorNoise:
-    believed = scenario.filter_model
-    return SensorNoise(
-        variances=(believed.sigma_pos_m**2, believed.sigma_vel_m_s**2),
-        measures=(1.0, float(scenario.sensor.measures == "position_and_velocity")),
-    )
-
-
 def _forces(scenario: Scenario) -> Forces:
     on, craft = scenario.perturbations, scenario.spacecraft
     return Forces(
@@ -157,19 +173,20 @@ def _forces(scenario: Scenario) -> Forces:
 def _scalars(scenario: Scenario) -> Scalars:
     start, believed, cost = scenario.start, scenario.filter_model, scenario.reward.cost()
     chain = scenario.dropout.chain(scenario.dt_s, scenario.orbit)
-    layout = observation_layout(scenario)
     return Scalars(
         dt_s=scenario.dt_s,
         num_steps=scenario.num_steps,
         max_accel=scenario.spacecraft.max_accel_m_s2,
         min_accel=scenario.spacecraft.min_accel_m_s2,
         thrust_noise=scenario.spacecraft.thrust_noise,
-        filter_thrust_variance=believed.thrust_noise**2,
         process_noise=scenario.process_noise_m_s2,
         sigma_pos=scenario.sensor.sigma_pos_m,
         sigma_vel=scenario.sensor.sigma_vel_m_s,
         spread_pos=start.initial_sigma_pos_m,
         spread_vel=start.initial_sigma_vel_m_s,
+        filter_thrust_variance=believed.thrust_noise**2,
+        filter_variance_pos=believed.sigma_pos_m**2,
+        filter_variance_vel=believed.sigma_vel_m_s**2,
         initial_variance_pos=believed.initial_sigma_pos_m**2,
         initial_variance_vel=believed.initial_sigma_vel_m_s**2,
         link_loss=chain.stationary_loss,
@@ -180,8 +197,4 @@ def _scalars(scenario: Scenario) -> Scalars:
         max_distance=scenario.limits.max_distance_m,
         keep_out=scenario.limits.keep_out_m,
         tolerance=scenario.tolerance_m,
-        per_length=1 / layout.length_m,
-        per_speed=1 / (layout.length_m * layout.mean_motion_rad_s),
-        per_log_age=1 / np.log1p(layout.period_s / scenario.dt_s),
-        per_phase=1 / layout.num_phases,
     )

@@ -1,4 +1,4 @@
-"""The compiled step and reset over all tiles."""
+"""The compiled step and reset: a composition of stages, chosen by kinds."""
 
 from functools import cache
 from pathlib import Path
@@ -8,171 +8,219 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_env.files import hash_sources
-from formation_env.kernel import packing, unpacking, variants
-from formation_env.kernel import tile as field
-from formation_env.kernel.stages import kalman_filter, memory, noise, observe, reward, start, thruster, true_motion
-from formation_env.kernel.tile import Width
-from formation_env.numerics.arrays import Array
-from formation_env.numerics.jit import LANES, compiled_loop
+from formation_env.kernel import packing, settings, variants
+from formation_env.kernel.stages import kalman_filter, link, memory, noise, nonlinear_motion, observe, plan, reward
+from formation_env.kernel.stages import sensor, start, thruster, true_motion
+from formation_env.kernel.stages.memory import Flags, Integers
+from formation_env.kernel.tile import MODELS
+from formation_env.numerics.arrays import Array, Array32
+from formation_env.numerics.jit import LANES, compiled_program
+from formation_env.task.scenario import Scenario
 
-Float32 = NDArray[np.float32]
+Streams = NDArray[np.uint32]
+Rows = NDArray[np.intp]
 
-_RESET_BLOCK: Final = 3  # a reset draws from blocks of its own, so that its first measurement is drawn like any other
+MOTIONS: Final = {
+    "constant": true_motion.fly_constant,
+    "varying": true_motion.fly_varying,
+    "near": nonlinear_motion.fly_near,
+    "far": nonlinear_motion.fly_far,
+}
+"""The compiled stage of each kind of true motion."""
+
+
+class Kinds(NamedTuple):
+    """What a program is composed of, by names in the stages' registries.
+
+    Attributes:
+        truth: of the true motion, in `MOTIONS`.
+        filter_model: of the filter's model, in `kalman_filter.PREDICT`.
+        sensor: in `sensor.KINDS` and `kalman_filter.MEASURE`.
+        thruster: in `thruster.KINDS`.
+        varied: whether rows fly different variants (see `variants`).
+    """
+
+    truth: str
+    filter_model: str
+    sensor: str
+    thruster: str
+    varied: bool
 
 
 class Program(NamedTuple):
-    """The compiled functions for a kind of true motion and of the filter's model.
+    """The compiled functions for some kinds.
 
     Arguments that they share:
-        states: the rows' states (tiles, STATE_FIELDS * LANES), updated.
-        tile: scratch space for one tile (TILE_FIELDS * LANES,).
-        schedule: each variant's plan and varying models (variants, steps, columns), `packing.step_table`.
-        packed: each variant's settings (variants, SIZE), `packing.pack`.
+        states, streams: what the rows carry (tiles, STATE_SIZE) and (tiles, STREAM_SIZE), updated.
+        keys: of the rows' random numbers, with the number of the next episode (rows, 3).
+        work, work32, own: scratch space; `own` for the settings of the rows' variants.
+        schedule, seen, packed: what the scenario's variants need, `packing.pack_variants`.
         observations: (rows, SIZE), written.
-        results: (NUM_RESULTS, tiles * LANES), written.
-        width: see `tile.Width`.
+        results, flags, integers, noises: blocks (fields, rows), written; no fields of `noises` if nobody asks.
 
     Attributes:
-        step: fly all rows over one step, under actions (rows, 3).
-        reset: start the next episode of the rows `rows` (k,), side by side in scratch space, from `starts`: states
+        step: fly all rows over one step, under actions (rows, 3); returns how many episodes ended.
+        reset: start the next episode of the rows `rows` (k,), side by side in a spare tile, from `starts`: states
             (k, 6) to start at exactly if `given`, else each variant's nominal start (variants, 6).
-        redraw: draw the standard normals (NUM_NORMALS, tiles * LANES) of the last step or reset again.
+        look: write the observations of all rows again.
     """
 
     step: Any
     reset: Any
-    redraw: Any
+    look: Any
+
+
+def kinds_of(scenario: Scenario, num_variants: int) -> Kinds:
+    """The kinds that a scenario needs."""
+    return Kinds(
+        truth=packing.truth_kind(scenario),
+        filter_model=packing.filter_kind(scenario),
+        sensor=scenario.sensor.measures,
+        thruster="ideal",
+        varied=num_variants > 1,
+    )
 
 
 @cache
-def program(truth_kind: int, filter_kind: int, varied: bool) -> Program:
-    """The compiled functions for kinds of true motion and of the filter's model (see `packing`).
-
-    Args:
-        truth_kind: kind of the true motion.
-        filter_kind: kind of the filter's model.
-        varied: whether rows fly different variants (see `variants`).
-    """
+def program(kinds: Kinds) -> Program:
+    """The compiled functions for some kinds."""
     sources = _source_hash()
-    return Program(_step(sources, truth_kind, filter_kind, varied), _reset(sources, varied), _redraw(sources))
+    return Program(_step(kinds, sources), _reset(kinds, sources), _look(sources))
 
 
-# numba's cache looks only at the file of the outermost function; `source_hash`, a closure variable and so part of the
-# cache's key, makes it see the others too. A closure may hold numbers only, since functions are new in each process.
-# That is why a stage that depends on a kind is chosen by `if` on closure variables: numba drops the other branches
-# before it types them. The choice must stand in the outermost function.
+# Long: numba takes the arrays one by one, and the order of the stages is best read at one place.
+def _step(kinds: Kinds, sources: str) -> Any:
+    """Compile the step."""
+    thrust, move = thruster.KINDS[kinds.thruster], MOTIONS[kinds.truth]
+    predict = kalman_filter.PREDICT[kinds.filter_model]
+    sense, measure = sensor.KINDS[kinds.sensor], kalman_filter.MEASURE[kinds.sensor]
+    table = MODELS + (settings.FILTER_SIZE if kinds.filter_model == packing.VARYING else 0)
+    varied = kinds.varied
 
-
-# Long: the choice of stages must stand in the outermost function, see above.
-def _step(source_hash: int, truth_kind: int, filter_kind: int, varied: bool) -> Any:
-    """Compile the step of all rows."""
-    behind_filter_model = field.TABLE + (unpacking.FILTER_SIZE * LANES if filter_kind == packing.TIME_VARYING else 0)
-    constant_truth, constant_filter = truth_kind == packing.TIME_INVARIANT, filter_kind == packing.TIME_INVARIANT
-    # Rows of different variants have models of their own, as rows at different steps have where models vary.
-    one_truth, one_filter_model = constant_truth and not varied, constant_filter and not varied
-    true_table = variants.TRUTH if constant_truth else behind_filter_model
-    filter_table = variants.FILTER if constant_filter else field.TABLE
-    far = truth_kind == packing.NONLINEAR_FAR
-    nonlinear = far or truth_kind == packing.NONLINEAR_NEAR
-
-    @compiled_loop
+    @compiled_program("step", kinds, sources)
     def step(
         states: Array,
-        tile: Array,
+        streams: Streams,
+        work: Array,
+        work32: Array32,
+        own: Array,
         schedule: Array,
+        seen: Array32,
         packed: Array,
-        actions: Float32,
-        observations: Float32,
+        actions: Array32,
+        observations: Array32,
         results: Array,
-        width: Width,
+        flags: Flags,
+        integers: Integers,
+        noises: Array,
     ) -> int:
-        """Fly all rows over one step; the arguments are those of `Program`."""
-        if varied:
-            true_dynamics, model, process, sensor, forces, settings = variants.nothing_shared()
-        else:
-            true_dynamics, model, process, sensor, forces, settings = unpacking.unpack(packed[0])
-        known_step = -1
+        """Fly rows over one step; the arguments are those of `Program`."""
+        ended, known_line = 0, -1
         for index in range(len(states)):
-            used = min(len(width), len(actions) - index * LANES)
-            memory.load(tile, width, states, index, actions, used)
+            state, row = states[index], index * LANES
+            n = min(LANES, len(actions) - row)
+            plan.advance(state, n)
             if varied:
-                variants.load(tile, width, schedule, packed)
+                variants.read_settings(state, packed, own, n)
+                numbers = own
             else:
-                known_step = memory.read_plan(tile, width, used, schedule[0], known_step)
-            noise.draw(tile, width, 0)
-            thruster.thrust(tile, width, settings)
-            if one_truth:
-                true_motion.fly_linear(tile, width, true_dynamics, settings)
-            elif nonlinear:
-                true_motion.fly_nonlinear(tile, width, true_table, far, forces, settings)
-            else:
-                true_motion.fly_varying(tile, width, true_table, settings)
-            if one_filter_model:
-                kalman_filter.predict(tile, width, model, process, settings)
-            else:
-                kalman_filter.predict_varying(tile, width, filter_table, settings)
-            kalman_filter.measure(tile, width, sensor, settings)
-            reward.score(tile, width, settings)
-            observe.observe(tile, width, settings)
-            memory.store(tile, width, states, index, observations, results, used)
-        return source_hash
+                numbers = packed
+            known_line = plan.read_plan(state, work, work32, schedule, seen, known_line, n)
+            noise.draw(streams[index], work32, n)
+            thrust(actions, row, work, work32, numbers, n)
+            link.change(state, work32, numbers, n)
+            true_motion.push(work, work32, numbers, n)
+            move(state, work, numbers, table, n)
+            predict(state, work, numbers, n)
+            link.receive(state, work, numbers, n)
+            sense(state, work, work32, numbers, n)
+            if len(noises):
+                kalman_filter.innovate(state, work, n)
+                memory.write_noises(work, work32, numbers, noises, row, n)
+            measure(state, work, numbers, n)
+            reward.score(state, work, numbers, n)
+            observe.observe(state, work, work32, n)
+            memory.write_observations(work32, observations, row, n)
+            ended += memory.write_results(state, work, results, flags, integers, row, n)
+        return ended
 
     return step
 
 
-def _reset(source_hash: int, varied: bool) -> Any:
+# Long: see `_step`.
+def _reset(kinds: Kinds, sources: str) -> Any:
     """Compile the reset of some rows."""
+    sense, measure = sensor.KINDS[kinds.sensor], kalman_filter.MEASURE[kinds.sensor]
+    varied = kinds.varied
 
-    @compiled_loop
+    @compiled_program("reset", kinds, sources)
     def reset(
         states: Array,
-        tile: Array,
+        streams: Streams,
+        keys: NDArray[np.uint64],
+        spare: Array,
+        spare_stream: NDArray[np.uint32],
+        work: Array,
+        work32: Array32,
+        own: Array,
         schedule: Array,
+        seen: Array32,
         packed: Array,
-        rows: NDArray[np.intp],
+        rows: Rows,
         starts: Array,
         given: bool,
-        observations: Float32,
+        observations: Array32,
         results: Array,
-        width: Width,
-    ) -> int:
+        flags: Flags,
+        integers: Integers,
+        noises: Array,
+    ) -> None:
         """Start the next episode of some rows; the arguments are those of `Program`."""
-        if varied:
-            _, _, _, sensor, _, settings = variants.nothing_shared()
-        else:
-            _, _, _, sensor, _, settings = unpacking.unpack(packed[0])
-        for first in range(0, len(rows), len(width)):
-            memory.gather(tile, width, states, rows, first)
+        for first in range(0, len(rows), LANES):
+            n = min(LANES, len(rows) - first)
+            start.clear(spare, work)
             if varied:
-                variants.load(tile, width, schedule, packed)
+                variants.draw(spare, keys, rows, first, len(packed), n)
+                variants.read_settings(spare, packed, own, n)
+                numbers = own
             else:
-                memory.read_plan(tile, width, len(width), schedule[0], -1)
-            start.place(tile, width, starts, given, first)
-            noise.draw(tile, width, _RESET_BLOCK)
-            start.begin(tile, width, given, settings)
-            noise.draw(tile, width, 0)
-            kalman_filter.measure(tile, width, sensor, settings)
-            reward.score(tile, width, settings)
-            observe.observe(tile, width, settings)
-            memory.scatter(tile, width, states, rows, first, observations, results)
-        return source_hash
+                numbers = packed
+            plan.read_plan(spare, work, work32, schedule, seen, -1, n)
+            noise.begin_streams(spare_stream, keys, rows, first, n)
+            start.place(spare, starts, given, first, n)
+            noise.draw(spare_stream, work32, n)
+            start.begin(spare, work32, given, numbers, n)
+            noise.draw(spare_stream, work32, n)
+            link.receive(spare, work, numbers, n)
+            sense(spare, work, work32, numbers, n)
+            if len(noises):
+                kalman_filter.innovate(spare, work, n)
+                memory.scatter_noises(work, noises, rows, first, n)
+            measure(spare, work, numbers, n)
+            reward.score(spare, work, numbers, n)
+            observe.observe(spare, work, work32, n)
+            memory.scatter_state(spare, spare_stream, states, streams, rows, first, n)
+            memory.scatter_results(spare, work, work32, observations, results, flags, integers, rows, first, n)
 
     return reset
 
 
-def _redraw(source_hash: int) -> Any:
-    """Compile the repeated draw of the last step's random numbers."""
+def _look(sources: str) -> Any:
+    """Compile the repetition of the observations."""
 
-    @compiled_loop
-    def redraw(states: Array, tile: Array, normals: Array, width: Width) -> int:
-        """Draw all rows' standard normals again; the arguments are those of `Program`."""
+    @compiled_program("look", sources)
+    def look(
+        states: Array, work: Array, work32: Array32, schedule: Array, seen: Array32, observations: Array32
+    ) -> None:
+        """Write the observations of all rows; the arguments are those of `Program`."""
         for index in range(len(states)):
-            memory.load_streams(tile, width, states, index)
-            noise.draw(tile, width, 0)
-            memory.store_normals(tile, width, normals, index)
-        return source_hash
+            state, row = states[index], index * LANES
+            n = min(LANES, len(observations) - row)
+            plan.read_plan(state, work, work32, schedule, seen, -1, n)
+            observe.observe(state, work, work32, n)
+            memory.write_observations(work32, observations, row, n)
 
-    return redraw
+    return look
 
 
 COMPILED_SOURCES: Final = (
@@ -187,8 +235,7 @@ COMPILED_SOURCES: Final = (
 """Sources whose functions or constants are compiled into the program."""
 
 
-def _source_hash() -> int:
+def _source_hash() -> str:
     """Hash of all source files that the compiled code comes from."""
     package = Path(__file__).parents[1]
-    paths = sorted(path for pattern in COMPILED_SOURCES for path in package.glob(pattern))
-    return int(hash_sources(paths)[:14], 16)  # 56 bits: numba knows integers of 64
+    return hash_sources(sorted(path for pattern in COMPILED_SOURCES for path in package.glob(pattern)))

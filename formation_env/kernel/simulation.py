@@ -1,15 +1,17 @@
 """Rows of episodes of one scenario: the arrays of the compiled program, and their values by name."""
 
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_env.kernel import packing
-from formation_env.kernel import tile as field
-from formation_env.kernel.program import program
-from formation_env.kernel.stages.noise import NUM_NORMALS, PROCESS_NORMALS, SENSOR_NORMALS, THRUST_NORMAL
-from formation_env.numerics.arrays import Array
+from formation_env.kernel import settings
+from formation_env.kernel.packing import pack_variants
+from formation_env.kernel.program import kinds_of, program
+from formation_env.kernel.results import NO_NOISES, RESULT_NAMES, StepResults
+from formation_env.kernel.stages.noise import STREAM_SIZE
+from formation_env.kernel.tile import FLAGS, RESULTS, STATE, STATE_SIZE, TOTALS, WORK32_SIZE, WORK_SIZE, State
+from formation_env.numerics.arrays import Array, Array32
 from formation_env.numerics.jit import LANES
 from formation_env.numerics.random_streams import stream_key
 from formation_env.task import observation
@@ -20,26 +22,10 @@ from formation_env.task.variants import draw_variants
 Rows = slice | NDArray[np.intp]
 """A selection of rows: a slice, or indices."""
 ALL_ROWS: Final = slice(None)
-RESULT_PLACES: Final = {name: first for name, (first, _) in field.STEP_RESULTS.items()}
-"""Place of each named result, or of its first component, in `Simulation.first_row_results`."""
+_STATE_SPANS: Final = {name: (getattr(STATE, name) // LANES, size) for name, size in State()._asdict().items()}
 _STATE_SLICES: Final = {
-    name: slice(first * LANES, (first + size) * LANES, LANES) for name, (first, size) in field.STATES.items()
+    name: slice(first * LANES, (first + size) * LANES, LANES) for name, (first, size) in _STATE_SPANS.items()
 }
-
-
-class StepNoises(NamedTuple):
-    """Random numbers of the last step (or reset), in physical units.
-
-    Attributes:
-        measurement: simulated measurement (rows, 6), m and m/s, whether or not it was received (`measured` tells); a
-            sensor of positions alone gives (rows, 3).
-        process_noise_m_s2: random acceleration along LVLH held over the step (rows, 3); 0 after a reset.
-        thrust_noise: relative error of the thrust's magnitude (rows,); 0 after a reset.
-    """
-
-    measurement: Array
-    process_noise_m_s2: Array
-    thrust_noise: Array
 
 
 class Simulation:
@@ -50,76 +36,126 @@ class Simulation:
         num_rows: number of episodes side by side.
         variants: scenarios that each episode draws from: the scenario alone, or its variants.
         schedule: the plans' tables (variants, steps, columns), see `schedule.FIELDS`; a shorter one repeats its end.
+        plan_limits: steps of each variant's plan and its distance limit, m (variants, 2).
         actions: (num_rows, 3) float32, to be filled before `step`.
+        results: of the last step or reset; blocks of its own, so a later step does not change them.
     """
 
-    def __init__(self, scenario: Scenario, num_rows: int) -> None:
+    def __init__(self, scenario: Scenario, num_rows: int, with_noises: bool = False) -> None:
+        """Make the rows; they have no streams before `seed`.
+
+        Args:
+            scenario: the scenario.
+            num_rows: rows.
+            with_noises: whether results hold the step's noises, see `tile.Noises`.
+        """
         tiles = -(-num_rows // LANES)
         self.scenario = scenario
         self.num_rows = num_rows
         self.variants = draw_variants(scenario)
-        self.schedule, self._settings = packing.pack_variants(self.variants)
+        self.schedule, self._seen, self._settings = pack_variants(self.variants)
         self.actions = np.zeros((num_rows, 3), np.float32)
-        self._results = np.zeros((field.NUM_RESULTS, tiles * LANES))
-        self._states = np.zeros((tiles, field.STATE_FIELDS * LANES))
-        self._scratch = np.zeros((field.TILE_FIELDS + self.schedule.shape[2] - WIDTH) * LANES)
-        varied = len(self.variants) > 1
-        self._program = (packing.truth_kind(scenario), packing.filter_kind(scenario), varied)
-        self._width = (False,) * (1 if num_rows == 1 else LANES)
+        self.results = StepResults.zeros(num_rows, with_noises)
+        self._with_noises = with_noises
+        self._shapes = tuple(block.shape for block in self.results.blocks)
+        self._states = np.zeros((tiles, STATE_SIZE))
+        self._streams = np.zeros((tiles, STREAM_SIZE), np.uint32)
+        self._keys = np.zeros((num_rows, 3), np.uint64)
+        self._scratch = self._new_scratch()
+        self._spare = np.zeros(STATE_SIZE), np.zeros(STREAM_SIZE, np.uint32)
+        self._arrays = (self._states, self._streams, *self._scratch, self.schedule, self._seen, self._settings)
+        self._kinds = kinds_of(scenario, len(self.variants))
+        self.plan_limits = np.array([(each.num_steps, each.limits.max_distance_m) for each in self.variants])
         self._nominal_starts = np.array([each.start.formation.state(each.orbit) for each in self.variants])
+
+    def _new_scratch(self) -> tuple[Array, Array32, Array]:
+        """Scratch space of a step: double, single, and the settings of the rows' variants."""
+        width = WORK_SIZE + (self.schedule.shape[2] - WIDTH) * LANES
+        own = settings.SIZE * LANES if len(self.variants) > 1 else 0
+        return np.zeros(width), np.zeros(WORK32_SIZE, np.float32), np.zeros(own)
 
     def seed(self, row: int, generator: np.random.Generator) -> None:
         """Give a row a new random stream; its next episode is the stream's first."""
-        key = stream_key(generator).view(np.float64)
-        for offset, value in ((field.KEY, key[0]), (field.KEY + LANES, key[1]), (field.EPISODE, -1.0)):
-            self._states[row // LANES, offset + row % LANES] = value
+        self._keys[row, :2] = stream_key(generator)
+        self._keys[row, 2] = 0
 
-    def reset(self, rows: NDArray[np.intp], observations: NDArray[np.float32], starts: Array | None = None) -> None:
-        """Begin the next episode of some rows.
+    def reset(self, rows: NDArray[np.intp], observations: Array32, starts: Array | None = None) -> None:
+        """Begin the next episode of some rows; `results` change in these rows, but for reward and ends.
 
         Args:
             rows: their indices (k,).
             observations: (num_rows, SIZE), written in these rows.
             starts: LVLH states (k, 6) to start at, in place of the scenario's start and its spread.
         """
-        places = self._nominal_starts if starts is None else np.ascontiguousarray(starts)
-        program(*self._program).reset(
+        program(self._kinds).reset(
             self._states,
-            self._scratch,
+            self._streams,
+            self._keys,
+            *self._spare,
+            *self._scratch,
             self.schedule,
+            self._seen,
             self._settings,
             rows,
-            places,
+            self._nominal_starts if starts is None else np.ascontiguousarray(starts),
             starts is not None,
             observations,
-            self._results,
-            self._width,
+            *self.results.blocks,
         )
 
-    def step(self, observations: NDArray[np.float32]) -> None:
-        """Fly all rows over one step with `actions`.
+    def step(self, observations: Array32) -> int:
+        """Fly all rows over one step with `actions`, and put new `results`.
 
         Args:
             observations: (num_rows, SIZE), written.
+
+        Returns:
+            How many episodes ended.
         """
-        program(*self._program).step(
-            self._states,
-            self._scratch,
-            self.schedule,
-            self._settings,
-            self.actions,
-            observations,
-            self._results,
-            self._width,
+        self.results = results = self._new_results()
+        ended: int = program(self._kinds).step(
+            *self._arrays, self.actions, observations, results.values, results.flags, results.integers, results.noises
+        )
+        return ended
+
+    def _new_results(self) -> StepResults:
+        """Uninitialised blocks."""
+        values, flags, integers, noises = self._shapes
+        return StepResults(
+            np.empty(values),
+            np.empty(flags, np.bool_),
+            np.empty(integers, np.int64),
+            np.empty(noises) if self._with_noises else NO_NOISES,
+            self.num_rows,
         )
 
+    def forget_ends(self, rows: NDArray[np.intp]) -> None:
+        """Let rows that only began in this step have neither reward nor end."""
+        self.results.values[RESULTS.reward, rows] = 0.0
+        self.results.flags[FLAGS.terminated :, rows] = False
+
+    def new_results(self, rows: NDArray[np.intp]) -> None:
+        """Let a reset of some rows write into blocks of its own."""
+        whole = len(rows) == self.num_rows
+        zero = StepResults.zeros(self.num_rows, self._with_noises)
+        self.results = zero if whole else self.results.copy()
+
     def memory(self) -> Array:
-        """Copy of the rows' state, random streams included, for `recall`."""
-        return self._states.copy()
+        """Copy of the rows' state, random streams included, for `recall`: numbers (k,) of any meaning."""
+        parts = (self._states, self._streams, self._keys)
+        return np.concatenate([part.view(np.float64).ravel() for part in parts])
 
     def recall(self, memory: Array) -> None:
         """Restore the rows' state from a copy made by `memory`."""
-        self._states[:] = memory
+        parts = [part.view(np.float64) for part in (self._states, self._streams, self._keys)]
+        ends = np.cumsum([part.size for part in parts])
+        for part, values in zip(parts, np.split(memory, ends[:-1]), strict=True):
+            part[...] = values.reshape(part.shape)
+
+    def look(self, observations: Array32) -> None:
+        """Write the observations (num_rows, SIZE) of all rows again, as the last step or reset left them."""
+        work, work32, _ = self._scratch
+        program(self._kinds).look(self._states, work, work32, self.schedule, self._seen, observations)
 
     def new_observations(self) -> NDArray[np.float32]:
         """Uninitialised array (num_rows, SIZE) for the observations of all rows."""
@@ -129,8 +165,8 @@ class Simulation:
         """Copy of a named quantity of some rows.
 
         Args:
-            name: a result of the last step or reset (`tile.STEP_RESULTS`: `position_error`, `thrust`, `measured`, ...)
-                or a part of the state (`tile.STATES`: `true_state`, `estimate`, `measurement_age`, `sum_delta_v`, ...).
+            name: a result of the last step or reset (`tile.Results`, `Flags`, `Integers`: `position_error`, `thrust`,
+                `measured`, ...) or a part of the state (`tile.State`: `estimate`, `sum_delta_v`, ...).
             rows: the rows, in this order.
             dtype: type of the values.
 
@@ -140,49 +176,21 @@ class Simulation:
         Raises:
             KeyError: unknown name.
         """
-        if name in field.STEP_RESULTS:
-            first, size = field.STEP_RESULTS[name]
-            if size == 1:
-                scalars = self._results[first, : self.num_rows]
-                return (scalars if rows is ALL_ROWS else scalars[rows]).astype(dtype)
-            vectors = self._results[first : first + size, : self.num_rows].T
-            return vectors[rows].astype(dtype, order="C")
-        if name not in field.STATES:
-            raise KeyError(f"read: unknown name {name!r}; known: {', '.join((*field.STEP_RESULTS, *field.STATES))}")
-        values: NDArray[Any] = self._state(*field.STATES[name], rows).astype(dtype, copy=False)
-        return values[:, 0] if values.shape[1] == 1 else values
+        if name in STATE._fields:
+            values: NDArray[Any] = self._state(*_STATE_SPANS[name], rows).astype(dtype, copy=False)
+            return values[:, 0] if values.shape[1] == 1 else values
+        if name not in RESULT_NAMES:
+            raise KeyError(f"read: unknown name {name!r}; known: {', '.join((*RESULT_NAMES, *STATE._fields))}")
+        return self.results[name][rows].astype(dtype, order="C")
 
     def totals(self, rows: Rows = ALL_ROWS) -> dict[str, Array]:
         """Totals of the rows' episodes up to now, by name (`tile.TOTALS`), each (rows,)."""
-        block = self._state(field.FIRST_TOTAL // LANES, field.NUM_TOTALS, rows).T
-        return {name: block[first] for name, (first, _) in field.TOTALS.items()}
-
-    def first_row_results(self) -> list[float]:
-        """Results of the first row's last step as Python numbers, by `RESULT_PLACES`; fast, for a single env."""
-        values: list[float] = self._results[:, 0].tolist()
-        return values
+        first, _ = _STATE_SPANS[TOTALS[0]]
+        return dict(zip(TOTALS, self._state(first, len(TOTALS), rows).T, strict=True))
 
     def first_row_state(self, name: str) -> Array:
         """Copy (size,) of a named part of the first row's state; fast, for a single environment."""
         return self._states[0, _STATE_SLICES[name]].copy()
-
-    def step_noises(self, rows: Rows = ALL_ROWS) -> StepNoises:
-        """Random numbers of the last step, drawn again from the rows' streams: a step that nobody asks pays nothing."""
-        normals = np.empty((NUM_NORMALS, self._results.shape[1]))
-        program(*self._program).redraw(self._states, self._scratch, normals, self._width)
-        drawn = normals[:, : self.num_rows].T[rows]
-        own = self.variant(rows)
-        flown = (self.read("step", rows) > 0)[:, None]
-        sensor_sigma, process_sigma, thrust_sigma = (
-            np.array(values)[own] for values in zip(*(_sigmas(each) for each in self.variants), strict=True)
-        )
-        measured = slice(3 if self.scenario.sensor.measures == "position" else 6)
-        measurement = self.read("true_state", rows) + sensor_sigma * drawn[:, SENSOR_NORMALS]
-        return StepNoises(
-            measurement=measurement[:, measured],
-            process_noise_m_s2=flown * process_sigma[:, None] * drawn[:, PROCESS_NORMALS],
-            thrust_noise=flown[:, 0] * thrust_sigma * drawn[:, THRUST_NORMAL],
-        )
 
     @property
     def first_references_m(self) -> Array:
@@ -208,9 +216,3 @@ class Simulation:
         columns = offset + np.arange(size) * LANES
         values: Array = self._states[(rows // LANES)[:, None], columns + (rows % LANES)[:, None]]
         return values
-
-
-def _sigmas(scenario: Scenario) -> tuple[Array, float, float]:
-    """Standard deviations of the sensor (6,), the process noise and the thrust's relative error."""
-    sensor = np.repeat([scenario.sensor.sigma_pos_m, scenario.sensor.sigma_vel_m_s], 3)
-    return sensor, scenario.process_noise_m_s2, scenario.spacecraft.thrust_noise

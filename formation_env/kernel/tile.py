@@ -1,117 +1,147 @@
-"""The layout of a tile: LANES rows side by side, field after field, in one flat array.
+"""The layout of a tile: LANES rows side by side, field after field, in flat arrays.
 
-A field is an offset; row i of the tile has its value at tile[FIELD + i]. Vectors and matrices take consecutive fields.
-The first fields are a row's state and live from step to step; the rest is scratch space, shared by all tiles. A field
-with a name can be read from outside, by `Simulation.read`.
+A field is an offset: row i has its value at array[FIELD + i], and the next component of a vector LANES further on. The
+classes below declare the fields in order, each with its number of values; `STATE`, `WORK`, ... hold the offsets.
 """
 
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, TypeVar
 
-from formation_env.kernel import unpacking
+import numpy as np
+
 from formation_env.numerics.jit import LANES
 from formation_env.task import observation, schedule
 
-Width = tuple[bool, ...]
-"""Number of rows of a tile that are computed, as the length of a tuple: numba specialises on it."""
+
+class State(NamedTuple):
+    """What a row carries from step to step, float64."""
+
+    true_state: int = 6  # LVLH, m and m/s
+    estimate: int = 6
+    covariance_in_plane: int = 10  # the filter's, upper triangles
+    covariance_cross_track: int = 3
+    link_up: int = 1
+    measured: int = 1  # 1 if this instant's measurement arrived
+    measurement_age: int = 1  # s since the last measurement
+    step: int = 1
+    variant: int = 1  # index of the scenario's variant that the row flies
+    # Totals of the episode.
+    sum_reward: int = 1
+    sum_delta_v: int = 1
+    sum_error: int = 1  # over the hold
+    sum_square_error: int = 1
+    max_error: int = 1
+    arrival_error: int = 1
+    tolerated: int = 1  # steps of the hold within the tolerance
+    lost: int = 1  # steps without a measurement
 
 
-class Span(NamedTuple):
-    """The values per row that belong to a name.
+class Work(NamedTuple):
+    """Scratch space of a step, float64, shared by all tiles."""
 
-    Attributes:
-        first: index of the first value among all fields (an offset is LANES times as large).
-        size: number of values.
-    """
-
-    first: int
-    size: int
-
-
-_next_field = 0
-_spans: dict[str, Span] = {}
-
-
-def _field(name: str = "", size: int = 1) -> int:
-    """Offset of a new field of `size` values per row; with a name it can be read from outside."""
-    global _next_field
-    offset: int = _next_field * LANES
-    if name:
-        _spans[name] = Span(_next_field, size)
-    _next_field += size
-    return offset
+    command: int = 3  # acceleration that the filter knows of, m/s^2
+    push: int = 3  # acceleration that acts, with the random one, m/s^2
+    measurement: int = 6  # simulated, m and m/s, whether or not it is received
+    innovation: int = 6  # measurement minus its prediction
+    # The step's results, in the order of `Results`.
+    thrust: int = 3
+    position_error: int = 1
+    delta_v: int = 1
+    error_cost: int = 1
+    exit_cost: int = 1
+    nis: int = 1
+    reward: int = 1
+    terminated: int = 1
+    truncated: int = 1
+    # For the nonlinear truth.
+    relative: int = 6  # position and velocity relative to the leader along inertial axes
+    before: int = 6  # the same at the substep's start
+    rates: int = 42  # of each stage
+    plan: int = schedule.WIDTH  # the row's line of the schedule; behind it stand its varying models
 
 
-def _named(first: int, end: int) -> dict[str, Span]:
-    """Spans of the named fields from `first` to `end`, counted from `first`."""
-    return {name: Span(at - first, size) for name, (at, size) in _spans.items() if first <= at < end}
+class Work32(NamedTuple):
+    """Scratch space of a step, float32, shared by all tiles."""
+
+    process_noise: int = 3  # standard normals
+    sensor_noise: int = 6
+    thrust_noise: int = 1
+    link_noise: int = 1  # uniform in [0, 1)
+    observation: int = observation.SIZE
+    scales: int = len(schedule.SCALES)  # of the observation, see `schedule.SCALES`
 
 
-# A row's state.
-KEY: Final = _field(size=2)  # of the random stream, the bits of 64-bit integers
-EPISODE: Final = _field("episode")
-STEP: Final = _field("step")
-TRUTH: Final = _field("true_state", 6)  # LVLH state, m and m/s
-ESTIMATE: Final = _field("estimate", 6)
-P_IN_PLANE: Final = _field("covariance_in_plane", 10)  # filter's covariances, upper triangles
-P_CROSS_TRACK: Final = _field("covariance_cross_track", 3)
-LINK_UP: Final = _field("link_up")
-AGE: Final = _field("measurement_age")  # s since the last measurement
-# Totals of the episode.
-FIRST_TOTAL: Final = _next_field * LANES
-SUM_REWARD: Final = _field("sum_reward")
-SUM_DELTA_V: Final = _field("sum_delta_v")
-SUM_ERROR: Final = _field("sum_error")  # over the hold
-SUM_SQUARE: Final = _field("sum_square_error")
-MAX_ERROR: Final = _field("max_error")
-ARRIVAL_ERROR: Final = _field("arrival_error")
-TOLERATED: Final = _field("tolerated")  # steps of the hold within the tolerance
-LOST: Final = _field("lost")  # steps without a measurement
-NUM_TOTALS: Final = _next_field - FIRST_TOTAL // LANES
-STATE_FIELDS: Final = _next_field
-STATES: Final = _named(0, STATE_FIELDS)
-"""Named parts of a row's state."""
-TOTALS: Final = _named(FIRST_TOTAL // LANES, STATE_FIELDS)
-"""Totals of the episode, counted from the first."""
+class Results(NamedTuple):
+    """What a step or a reset tells, float64; its own block (fields, rows), which the step writes once."""
 
-# Scratch: inputs of the step.
-ACTION: Final = _field(size=3)
-PLAN: Final = _field(size=schedule.WIDTH)  # the schedule's row
-UNIFORM: Final = _field(size=12)
-NORMAL: Final = _field(size=12)
-COMMAND: Final = _field(size=3)  # acceleration that the filter knows of, m/s^2
-# Results of the step.
-RESULTS: Final = _next_field * LANES
-THRUST: Final = _field("thrust", 3)  # acceleration that acts, m/s^2
-REWARD: Final = _field("reward")
-TERMINATED: Final = _field("terminated")
-TRUNCATED: Final = _field("truncated")
-POSITION_ERROR: Final = _field("position_error")
-DELTA_V: Final = _field("delta_v")
-ERROR_COST: Final = _field("error_cost")
-EXIT_COST: Final = _field("exit_cost")
-NIS: Final = _field("nis")  # normalised innovation squared
-MEASURED: Final = _field("measured")
-PHASE: Final = _field("phase")
-VARIANT: Final = _field("variant")  # index of the scenario's variant that the row flies
-NUM_RESULTS: Final = _next_field - RESULTS // LANES
-STEP_RESULTS: Final = _named(RESULTS // LANES, _next_field)
-"""Named results of a step, counted from the first."""
-OBSERVATION: Final = _field(size=observation.SIZE)
-# For the true motion.
-PUSH: Final = _field(size=3)  # thrust plus random acceleration along LVLH, m/s^2
-RELATIVE: Final = _field(size=6)  # position and velocity relative to the leader along inertial axes
-BEFORE: Final = _field(size=6)  # RELATIVE at the substep's start
-RATES: Final = _field(size=42)  # of each stage
-SETTINGS: Final = _field(size=unpacking.SIZE)  # of the row's variant, if there are several
-TABLE: Final = _next_field * LANES  # the row's varying models, last since their number varies (`packing.step_table`)
-TILE_FIELDS: Final = _next_field
+    true_state: int = 6
+    estimate: int = 6
+    thrust: int = 3  # acceleration that acts, m/s^2
+    position_error: int = 1
+    delta_v: int = 1
+    error_cost: int = 1
+    exit_cost: int = 1
+    nis: int = 1  # normalised innovation squared
+    reward: int = 1
+
+
+class Flags(NamedTuple):
+    """What a step or a reset tells, yes or no, in a block (fields, rows)."""
+
+    measured: int = 1
+    terminated: int = 1
+    truncated: int = 1
+
+
+class Integers(NamedTuple):
+    """What a step or a reset tells in whole numbers, in a block (fields, rows)."""
+
+    phase: int = 1
+    variant: int = 1
+
+
+class Noises(NamedTuple):
+    """Random numbers of a step in physical units and what the filter made of them, for those who ask (fields, rows)."""
+
+    measurement: int = 6  # simulated, m and m/s, whether or not it is received
+    innovation: int = 6  # measurement minus its prediction
+    process_noise: int = 3  # random acceleration along LVLH, m/s^2
+    thrust_noise: int = 1  # relative error of the thrust's magnitude
+
+
+Fields = TypeVar("Fields", State, Work, Work32, Results, Flags, Integers, Noises)
+
+
+def _placed(sizes: Fields, unit: int) -> Fields:
+    """The offset of each field: `unit` for each value before it."""
+    return type(sizes)(*(int(end - size) * unit for size, end in zip(sizes, np.cumsum(sizes), strict=True)))
+
+
+STATE: Final = _placed(State(), LANES)
+WORK: Final = _placed(Work(), LANES)
+WORK32: Final = _placed(Work32(), LANES)
+RESULTS: Final = _placed(Results(), 1)
+FLAGS: Final = _placed(Flags(), 1)
+INTEGERS: Final = _placed(Integers(), 1)
+NOISES: Final = _placed(Noises(), 1)
+
+STATE_SIZE: Final = sum(State()) * LANES
+WORK_SIZE: Final = sum(Work()) * LANES
+WORK32_SIZE: Final = sum(Work32()) * LANES
+NUM_RESULTS: Final = sum(Results())
+SHOWN: Final = RESULTS.reward
+"""How many of the results infos show; the reward behind them is returned by itself."""
+NUM_NOISES: Final = sum(Noises())
+TOTALS: Final = State._fields[State._fields.index("sum_reward") :]
+"""Names of the totals of the episode, the last fields of a row's state."""
+MODELS: Final = WORK_SIZE // LANES
+"""Place of the first number of the row's varying models, counted in numbers."""
 
 
 def plan(name: str) -> int:
-    """Offset of a column of the schedule."""
-    return int(PLAN + schedule.OFFSETS[name] * LANES)
+    """Offset of a column of the schedule in `Work`."""
+    return int(WORK.plan + schedule.OFFSETS[name] * LANES)
 
 
 def seen(name: str) -> int:
-    """Offset of a block of the observation."""
-    return int(OBSERVATION + observation.SLICES[name].start * LANES)
+    """Offset of a block of the observation in `Work32`."""
+    return int(WORK32.observation + observation.SLICES[name].start * LANES)

@@ -6,6 +6,9 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+Array32 = NDArray[np.float32]
+
+
 Observations = NDArray[np.float32]
 
 

@@ -5,7 +5,7 @@ a tile has a body of scalars only, which the compiler turns into vector instruct
 """
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from typing import Any, Final, TypeVar, cast
 
 import numba
@@ -15,7 +15,7 @@ from numba.extending import intrinsic, register_jitable
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-LANES: Final = 32
+LANES: Final = 64
 """Rows of one tile: a compile-time constant, a multiple of every vector width."""
 
 # Strict IEEE arithmetic, fused multiply-adds only where `fma` is written: a row's results are the same bits in a vector
@@ -46,10 +46,23 @@ def python_and_compiled(function: F) -> F:
 
 def compiled_loop(function: F) -> F:
     """Compile a loop over arrays that Python calls, and cache it on disk where that is possible."""
-    compiled = numba.njit(**_ARITHMETIC)(function)
+    return _cached(function, None)
+
+
+def compiled_program(*key: Hashable) -> Callable[[F], F]:
+    """Compile a loop that is composed of the functions it closes over; other threads run meanwhile.
+
+    Args:
+        key: tells it from others of the same source in the cache on disk: what was chosen, and a hash of all sources.
+    """
+    return lambda function: _cached(function, key)
+
+
+def _cached(function: F, key: tuple[Hashable, ...] | None) -> F:
+    compiled = numba.njit(**_ARITHMETIC, nogil=True)(function)
     if isinstance(compiled, Dispatcher):  # not with NUMBA_DISABLE_JIT
         try:
-            cast(Any, compiled)._cache = _Cache(function)  # type: ignore[no-untyped-call]
+            cast(Any, compiled)._cache = _Cache(function, key)
         except RuntimeError as error:  # numba found no folder that it may write to
             _warn_once(f"{error}; {_NO_CACHE}")
     return cast(F, compiled)
@@ -58,8 +71,18 @@ def compiled_loop(function: F) -> F:
 class _Cache(FunctionCache):
     """numba's cache of a function, which compiles anew where a file is damaged or cannot be written.
 
-    numba itself passes on whatever goes wrong, at every later run too.
+    numba itself passes on whatever goes wrong, at every later run too. It also tells functions apart by what they close
+    over, where another function counts as new in each process; a key of our own says what was chosen.
     """
+
+    def __init__(self, function: Callable[..., Any], key: tuple[Hashable, ...] | None) -> None:
+        super().__init__(function)  # type: ignore[no-untyped-call]
+        self._key = key
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        if self._key is None:
+            return super()._index_key(sig, codegen)  # type: ignore[no-untyped-call]
+        return sig, codegen.magic_tuple(), self._key
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled code for a signature, or None if there is none that can be used."""
@@ -96,25 +119,30 @@ def _warn_once(text: str) -> None:
         warnings.warn(f"formation_env: {text}", RuntimeWarning, stacklevel=3)
 
 
-def _spaced(typing_context: Any, values: Any, first: Any, step: Any, count: Any) -> Any:
-    """The type of `spaced`, and how its code is generated."""
+def _numbers(typing_context: Any, table: Any, first: Any, i: Any, count: Any) -> Any:
+    """The type of `numbers`, and how its code is generated."""
     if not isinstance(count, numba.types.IntegerLiteral):
-        raise numba.errors.RequireLiteralValue("spaced: count must be a constant")
-    size = count.literal_value
-    result = numba.types.UniTuple(values.dtype, size)  # type: ignore[no-untyped-call]
+        raise numba.errors.RequireLiteralValue("numbers: count must be a constant")
+    size, lanes = count.literal_value, 1 if table.ndim == 2 else LANES
+    result = numba.types.UniTuple(table.dtype, size)  # type: ignore[no-untyped-call]
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array = context.make_array(signature.args[0])(context, builder, arguments[0])
-        places = [builder.add(arguments[1], builder.mul(arguments[2], arguments[2].type(k))) for k in range(size)]
-        loads = [context.unpack_value(builder, values.dtype, builder.gep(array.data, [place])) for place in places]
+        _, first, lane, _ = arguments
+        loads = []
+        for k in range(size):
+            place = builder.mul(builder.add(first, first.type(k)), first.type(lanes))
+            if lanes > 1:
+                place = builder.add(place, lane)
+            loads.append(context.unpack_value(builder, table.dtype, builder.gep(array.data, [place])))
         return context.make_tuple(builder, result, loads)
 
-    return result(values, numba.types.intp, numba.types.intp, count), generate
+    return result(table, numba.types.intp, numba.types.intp, count), generate
 
 
-spaced: Any = intrinsic(_spaced)
-"""spaced(array, first, step, count): numbers of a contiguous array (n,) as a tuple; how many is a constant.
+numbers: Any = intrinsic(_numbers)
+"""numbers(table, first, i, count): row i's numbers first, first + 1, ... of a table, as a tuple; count is a constant.
 
-Each is a load of its own, which the compiler drops if nobody needs it, and turns into vector loads if a loop over rows
-is around it; with slices it does neither.
+A table that all rows share is (1, numbers); else row i has its own in a flat one, (numbers * LANES,). Each number is a
+load of its own, which the compiler drops if nobody needs it, and turns into vector loads in a loop over rows.
 """

@@ -1,10 +1,9 @@
-"""Counter-based random numbers.
+"""Random numbers: each row draws from a stream of its own.
 
-The generator is Threefry-2x64 with 13 rounds (Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3", the
-fewest that pass all tests there); normals come from it by Box & Muller (1958).
-
-A stream is a 128-bit key. Its numbers depend on (key, episode, step, block) alone, so rows need no shared state, and
-what one row draws never moves another's.
+A stream is xoshiro128++ (Blackman & Vigna 2021, "Scrambled linear pseudorandom number generators"), four 32-bit words.
+At the start of an episode they are set by Threefry-2x64 with 13 rounds (Salmon et al. 2011, "Parallel random numbers:
+as easy as 1, 2, 3") from the row's 128-bit key and the number of the episode. So rows share nothing, and what one draws
+never moves another's. Normals come by Box & Muller (1958), in single precision.
 """
 
 from typing import Final
@@ -12,17 +11,20 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_env.numerics.fastmath import cos_sin_turns, from_integer, log
 from formation_env.numerics.jit import inline_scalar
+from formation_env.numerics.single_precision import cos_sin, log
 
-BLOCKS_PER_STEP: Final = 8
-"""Counter values of one step; each gives four uniforms."""
+Words = tuple[np.uint32, np.uint32, np.uint32, np.uint32]
 
 _PARITY: Final = np.uint64(0x1BD11BDAA9FC1A22)
-_LOW: Final = np.uint64(0xFFFFFFFF)
-_32: Final = np.uint64(32)
 _64: Final = np.uint64(64)
-_2_TO_MINUS_32: Final = 2.0**-32
+_32: Final = np.uint32(32)
+_ONE: Final = np.uint32(1)
+_HALF: Final = np.float32(0.5)
+_MINUS_TWO: Final = np.float32(-2)
+_2_TO_MINUS_24: Final = np.float32(2.0**-24)
+_2_TO_MINUS_31: Final = np.float32(2.0**-31)
+_ANGLE: Final = np.float32(np.pi / 2 / 2.0**31)
 
 
 def stream_key(generator: np.random.Generator) -> NDArray[np.uint64]:
@@ -72,17 +74,31 @@ def threefry2x64(
 
 
 @inline_scalar
-def uniform_pair(word: np.uint64) -> tuple[float, float]:
-    """Two numbers in (0, 1) from 64 random bits, at the centres of 2^32 equal cells."""
-    return (
-        (from_integer(word >> _32) + 0.5) * _2_TO_MINUS_32,
-        (from_integer(word & _LOW) + 0.5) * _2_TO_MINUS_32,
-    )
+def _rotate(x: np.uint32, left: int) -> np.uint32:
+    return np.uint32(np.uint32(x << np.uint32(left)) | np.uint32(x >> np.uint32(_32 - np.uint32(left))))
 
 
 @inline_scalar
-def normal_pair(u0: float, u1: float) -> tuple[float, float]:
-    """Two independent standard normals from two uniforms in (0, 1); the tails end at 6.7 sigma."""
-    radius = np.sqrt(-2.0 * log(u0))
-    cosine, sine = cos_sin_turns(u1)
-    return radius * cosine, radius * sine
+def next_word(s0: np.uint32, s1: np.uint32, s2: np.uint32, s3: np.uint32) -> tuple[np.uint32, Words]:
+    """The stream's next random word, and its state behind it."""
+    word = np.uint32(_rotate(np.uint32(s0 + s3), 7) + s0)
+    shifted = np.uint32(s1 << np.uint32(9))
+    s2, s3 = np.uint32(s2 ^ s0), np.uint32(s3 ^ s1)
+    s1, s0 = np.uint32(s1 ^ s2), np.uint32(s0 ^ s3)
+    return word, (s0, s1, np.uint32(s2 ^ shifted), _rotate(s3, 11))
+
+
+@inline_scalar
+def uniform(word: np.uint32) -> np.float32:
+    """A number in [0, 1), a multiple of 2^-24."""
+    return np.float32(np.int32(word >> np.uint32(8))) * _2_TO_MINUS_24
+
+
+@inline_scalar
+def normal_pair(a: np.uint32, b: np.uint32) -> tuple[np.float32, np.float32]:
+    """Two independent standard normals from two random words; the tails end at 6.7 sigma."""
+    radius = np.sqrt(_MINUS_TWO * log((np.float32(np.int32(a >> _ONE)) + _HALF) * _2_TO_MINUS_31))
+    # The angle is in the right half-plane; the bit that the radius leaves mirrors half of the points into the left.
+    cosine, sine = cos_sin(np.float32(np.int32(b)) * _ANGLE)
+    mirrored = radius * cosine
+    return -mirrored if (a & _ONE) != 0 else mirrored, radius * sine

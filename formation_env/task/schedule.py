@@ -31,6 +31,9 @@ FIELDS: Final = {
     "arrives_left": 1,  # sum of the later ones
 }
 
+SCALES: Final = ("per_length", "per_speed", "per_step", "per_log_age")
+"""Scales of the observation: units per m, m/s and s, and of the logarithm of an age in steps."""
+
 
 def _offsets() -> dict[str, int]:
     ends = np.cumsum(list(FIELDS.values()))

@@ -24,10 +24,11 @@ def time_update(P4: Row, Phi4: Row, Q4: Row, P2: Row, Phi2: Row, Q2: Row) -> tup
 def measurement_update(
     x4: Row, P4: Row, z4: Row, x2: Row, P2: Row, z2: Row, variances: Pair, received: Pair
 ) -> tuple[Update, Update]:
-    return (
-        kalman.measurement_update_4(x4, P4, z4, variances, received),
-        kalman.measurement_update_2(x2, P2, z2, variances, received),
-    )
+    x4, P4, nis_4 = kalman.measure_pair_4(x4, P4, (z4[0], z4[1]), variances[0], received[0])
+    x4, P4, nis_v4 = kalman.measure_velocities_4(x4, P4, (z4[2], z4[3]), variances[1], received[1])
+    x2, P2, nis_2 = kalman.measure_first_2(x2, P2, z2[0], variances[0], received[0])
+    x2, P2, nis_v2 = kalman.measure_second_2(x2, P2, z2[1], variances[1], received[1])
+    return (x4, P4, nis_4 + nis_v4), (x2, P2, nis_2 + nis_v2)
 
 
 @numba.njit

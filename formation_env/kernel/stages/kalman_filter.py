@@ -1,123 +1,152 @@
-"""The Kalman filter of a row of a tile (see `kalman`)."""
+"""The Kalman filter of a row (see `kalman`)."""
 
 from formation_env.kernel import kalman
-from formation_env.kernel import tile as field
-from formation_env.kernel.stages.linear_model import propagate, read_model, read_process
-from formation_env.kernel.stages.link import dropout
-from formation_env.kernel.stages.noise import FIRST_SENSOR_NOISE
-from formation_env.kernel.tile import Width
-from formation_env.kernel.unpacking import Model, ProcessNoise, Scalars, SensorNoise
-from formation_env.kernel.variants import own_scalars, own_sensor
+from formation_env.kernel.settings import FILTER, Model, ProcessNoise, model, process_noise, scalars
+from formation_env.kernel.stages.linear_model import propagate
+from formation_env.kernel.tile import MODELS, STATE, WORK
 from formation_env.numerics.arrays import Array
 from formation_env.numerics.jit import LANES, inline_scalar, tile_function
 
 
 @inline_scalar
-def filter_time_update(tile: Array, i: int, model: Model, noise: ProcessNoise, settings: Scalars) -> None:
+def time_update(state: Array, work: Array, i: int, model: Model, noise: ProcessNoise) -> None:
     """The estimate and its covariance over one step (Ma 2009, eq. 4.74-4.75)."""
-    ax, ay, az = tile[field.COMMAND + i], tile[field.COMMAND + LANES + i], tile[field.COMMAND + 2 * LANES + i]
-    propagate(tile, i, field.ESTIMATE, model, ax, ay, az)
-    P = kalman.time_update_4(_load_10(tile, field.P_IN_PLANE + i), model.Phi_in_plane, noise.Q_in_plane)
-    P = kalman.thrust_noise_update_4(P, model.Gamma_in_plane, ax, ay, settings.filter_thrust_variance)
-    _store_10(tile, field.P_IN_PLANE + i, P)
-    p = field.P_CROSS_TRACK + i
+    c, p = WORK.command + i, STATE.covariance_cross_track + i
+    propagate(state, STATE.estimate + i, model, work[c], work[c + LANES], work[c + 2 * LANES])
+    P = kalman.time_update_4(_load_10(state, STATE.covariance_in_plane + i), model.Phi_in_plane, noise.Q_in_plane)
+    _store_10(state, STATE.covariance_in_plane + i, P)
     C = kalman.time_update_2(
-        (tile[p], tile[p + LANES], tile[p + 2 * LANES]), model.Phi_cross_track, noise.Q_cross_track
+        (state[p], state[p + LANES], state[p + 2 * LANES]), model.Phi_cross_track, noise.Q_cross_track
     )
-    C = kalman.thrust_noise_update_2(C, model.Gamma_cross_track, az, settings.filter_thrust_variance)
-    tile[p], tile[p + LANES], tile[p + 2 * LANES] = C
+    state[p], state[p + LANES], state[p + 2 * LANES] = C
 
 
 @inline_scalar
-def filter_measurement_update(tile: Array, i: int, sensor: SensorNoise, settings: Scalars) -> None:
-    """Measure the true state and take in what arrives (Ma 2009, eq. 4.71-4.73)."""
-    n, truth, x = FIRST_SENSOR_NOISE + i, field.TRUTH + i, field.ESTIMATE + i
-    received = (sensor.measures[0] * tile[field.MEASURED + i], sensor.measures[1] * tile[field.MEASURED + i])
-    plane = (
-        tile[truth] + settings.sigma_pos * tile[n],
-        tile[truth + LANES] + settings.sigma_pos * tile[n + LANES],
-        tile[truth + 3 * LANES] + settings.sigma_vel * tile[n + 3 * LANES],
-        tile[truth + 4 * LANES] + settings.sigma_vel * tile[n + 4 * LANES],
-    )
-    cross = (
-        tile[truth + 2 * LANES] + settings.sigma_pos * tile[n + 2 * LANES],
-        tile[truth + 5 * LANES] + settings.sigma_vel * tile[n + 5 * LANES],
-    )
-    (x0, x1, x3, x4), P, nis_plane = kalman.measurement_update_4(
-        (tile[x], tile[x + LANES], tile[x + 3 * LANES], tile[x + 4 * LANES]),
-        _load_10(tile, field.P_IN_PLANE + i),
-        plane,
-        sensor.variances,
-        received,
-    )
-    _store_10(tile, field.P_IN_PLANE + i, P)
-    p = field.P_CROSS_TRACK + i
-    (x2, x5), (p0, p1, p2), nis_cross = kalman.measurement_update_2(
-        (tile[x + 2 * LANES], tile[x + 5 * LANES]),
-        (tile[p], tile[p + LANES], tile[p + 2 * LANES]),
-        cross,
-        sensor.variances,
-        received,
-    )
-    tile[p], tile[p + LANES], tile[p + 2 * LANES] = p0, p1, p2
-    tile[x], tile[x + LANES], tile[x + 2 * LANES] = x0, x1, x2
-    tile[x + 3 * LANES], tile[x + 4 * LANES], tile[x + 5 * LANES] = x3, x4, x5
-    tile[field.NIS + i] = nis_plane + nis_cross
+def doubt_thrust(state: Array, work: Array, i: int, model: Model, variance: float) -> None:
+    """Add the uncertainty of a thrust whose magnitude has a relative error of this variance."""
+    c, p = WORK.command + i, STATE.covariance_cross_track + i
+    P = _load_10(state, STATE.covariance_in_plane + i)
+    P = kalman.thrust_noise_update_4(P, model.Gamma_in_plane, work[c], work[c + LANES], variance)
+    _store_10(state, STATE.covariance_in_plane + i, P)
+    C = (state[p], state[p + LANES], state[p + 2 * LANES])
+    C = kalman.thrust_noise_update_2(C, model.Gamma_cross_track, work[c + 2 * LANES], variance)
+    state[p], state[p + LANES], state[p + 2 * LANES] = C
+
+
+@tile_function
+def predict_constant(state: Array, work: Array, settings: Array, n: int) -> None:
+    """Update in time by the model that the settings hold."""
+    for i in range(min(n, LANES)):
+        time_update(state, work, i, model(settings, FILTER, i), process_noise(settings, FILTER, i))
+    if settings.ndim == 1 or scalars(settings, 0).filter_thrust_variance > 0.0:
+        for i in range(min(n, LANES)):
+            variance = scalars(settings, i).filter_thrust_variance
+            doubt_thrust(state, work, i, model(settings, FILTER, i), variance)
+
+
+@tile_function
+def predict_varying(state: Array, work: Array, settings: Array, n: int) -> None:
+    """Update in time by the model of the row's step, which stands behind the plan."""
+    for i in range(min(n, LANES)):
+        time_update(state, work, i, model(work, MODELS, i), process_noise(work, MODELS, i))
+    for i in range(min(n, LANES)):
+        doubt_thrust(state, work, i, model(work, MODELS, i), scalars(settings, i).filter_thrust_variance)
 
 
 @inline_scalar
-def _load_10(tile: Array, k: int) -> kalman.Symmetric4:
+def take_positions(state: Array, work: Array, i: int, variance: float) -> None:
+    """Measurement update with three positions (Ma 2009, eq. 4.71-4.73)."""
+    x, p, z = STATE.estimate + i, STATE.covariance_cross_track + i, WORK.measurement + i
+    received = state[STATE.measured + i]
+    (x0, x1, x3, x4), P, nis_plane = kalman.measure_pair_4(
+        (state[x], state[x + LANES], state[x + 3 * LANES], state[x + 4 * LANES]),
+        _load_10(state, STATE.covariance_in_plane + i),
+        (work[z], work[z + LANES]),
+        variance,
+        received,
+    )
+    _store_10(state, STATE.covariance_in_plane + i, P)
+    C = (state[p], state[p + LANES], state[p + 2 * LANES])
+    (x2, x5), C, nis = kalman.measure_first_2(
+        (state[x + 2 * LANES], state[x + 5 * LANES]), C, work[z + 2 * LANES], variance, received
+    )
+    state[p], state[p + LANES], state[p + 2 * LANES] = C
+    state[x], state[x + LANES], state[x + 2 * LANES] = x0, x1, x2
+    state[x + 3 * LANES], state[x + 4 * LANES], state[x + 5 * LANES] = x3, x4, x5
+    work[WORK.nis + i] = nis_plane + nis
+
+
+@inline_scalar
+def take_velocities(state: Array, work: Array, i: int, variance: float) -> None:
+    """Measurement update with three velocities."""
+    x, p, z = STATE.estimate + i, STATE.covariance_cross_track + i, WORK.measurement + i
+    received = state[STATE.measured + i]
+    (x0, x1, x3, x4), P, nis_plane = kalman.measure_velocities_4(
+        (state[x], state[x + LANES], state[x + 3 * LANES], state[x + 4 * LANES]),
+        _load_10(state, STATE.covariance_in_plane + i),
+        (work[z + 3 * LANES], work[z + 4 * LANES]),
+        variance,
+        received,
+    )
+    _store_10(state, STATE.covariance_in_plane + i, P)
+    C = (state[p], state[p + LANES], state[p + 2 * LANES])
+    (x2, x5), C, nis = kalman.measure_second_2(
+        (state[x + 2 * LANES], state[x + 5 * LANES]), C, work[z + 5 * LANES], variance, received
+    )
+    state[p], state[p + LANES], state[p + 2 * LANES] = C
+    state[x], state[x + LANES], state[x + 2 * LANES] = x0, x1, x2
+    state[x + 3 * LANES], state[x + 4 * LANES], state[x + 5 * LANES] = x3, x4, x5
+    work[WORK.nis + i] += nis_plane + nis
+
+
+@tile_function
+def measure_position(state: Array, work: Array, settings: Array, n: int) -> None:
+    """Take positions."""
+    for i in range(min(n, LANES)):
+        take_positions(state, work, i, scalars(settings, i).filter_variance_pos)
+
+
+@tile_function
+def measure_position_and_velocity(state: Array, work: Array, settings: Array, n: int) -> None:
+    """Take positions, then velocities."""
+    measure_position(state, work, settings, n)
+    for i in range(min(n, LANES)):
+        take_velocities(state, work, i, scalars(settings, i).filter_variance_vel)
+
+
+@tile_function
+def innovate(state: Array, work: Array, n: int) -> None:
+    """Measurement minus its prediction, for those who ask."""
+    for k in range(6):
+        for i in range(min(n, LANES)):
+            innovation = work[WORK.measurement + k * LANES + i] - state[STATE.estimate + k * LANES + i]
+            work[WORK.innovation + k * LANES + i] = innovation
+
+
+@inline_scalar
+def _load_10(state: Array, k: int) -> kalman.Symmetric4:
     return (
-        tile[k],
-        tile[k + LANES],
-        tile[k + 2 * LANES],
-        tile[k + 3 * LANES],
-        tile[k + 4 * LANES],
-        tile[k + 5 * LANES],
-        tile[k + 6 * LANES],
-        tile[k + 7 * LANES],
-        tile[k + 8 * LANES],
-        tile[k + 9 * LANES],
+        state[k],
+        state[k + LANES],
+        state[k + 2 * LANES],
+        state[k + 3 * LANES],
+        state[k + 4 * LANES],
+        state[k + 5 * LANES],
+        state[k + 6 * LANES],
+        state[k + 7 * LANES],
+        state[k + 8 * LANES],
+        state[k + 9 * LANES],
     )
 
 
 @inline_scalar
-def _store_10(tile: Array, k: int, P: kalman.Symmetric4) -> None:
-    tile[k], tile[k + LANES], tile[k + 2 * LANES], tile[k + 3 * LANES], tile[k + 4 * LANES] = (
-        P[0],
-        P[1],
-        P[2],
-        P[3],
-        P[4],
-    )
-    tile[k + 5 * LANES], tile[k + 6 * LANES], tile[k + 7 * LANES], tile[k + 8 * LANES], tile[k + 9 * LANES] = (
-        P[5],
-        P[6],
-        P[7],
-        P[8],
-        P[9],
-    )
+def _store_10(state: Array, k: int, P: kalman.Symmetric4) -> None:
+    state[k], state[k + LANES], state[k + 2 * LANES], state[k + 3 * LANES], state[k + 4 * LANES] = P[:5]
+    k += 5 * LANES
+    state[k], state[k + LANES], state[k + 2 * LANES], state[k + 3 * LANES], state[k + 4 * LANES] = P[5:]
 
 
-@tile_function
-def predict(tile: Array, width: Width, model: Model, noise: ProcessNoise, settings: Scalars) -> None:
-    """The filter's time update, by one model."""
-    for i in range(len(width)):
-        filter_time_update(tile, i, model, noise, settings)
-
-
-@tile_function
-def predict_varying(tile: Array, width: Width, table: int, settings: Scalars | None) -> None:
-    """Update in time by the model of the row, which stands in the tile at `table`."""
-    for i in range(len(width)):
-        model, noise = read_model(tile, i, table), read_process(tile, i, table)
-        filter_time_update(tile, i, model, noise, own_scalars(tile, i, settings))
-
-
-@tile_function
-def measure(tile: Array, width: Width, sensor: SensorNoise | None, settings: Scalars | None) -> None:
-    """Measurement and the filter's measurement update."""
-    for i in range(len(width)):
-        dropout(tile, i, own_scalars(tile, i, settings))
-    for i in range(len(width)):
-        filter_measurement_update(tile, i, own_sensor(tile, i, sensor), own_scalars(tile, i, settings))
+PREDICT = {"constant": predict_constant, "varying": predict_varying}
+"""The compiled time update of each kind of the filter's model."""
+MEASURE = {"position": measure_position, "position_and_velocity": measure_position_and_velocity}
+"""The compiled measurement update of each kind of sensor."""

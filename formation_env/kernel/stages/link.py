@@ -2,25 +2,28 @@
 
 from typing import Final
 
-from formation_env.kernel import tile as field
-from formation_env.kernel.stages.noise import LINK_UNIFORM
-from formation_env.kernel.unpacking import Scalars
-from formation_env.numerics.arrays import Array
-from formation_env.numerics.jit import inline_scalar
+from formation_env.kernel.settings import scalars
+from formation_env.kernel.tile import STATE, WORK32, plan
+from formation_env.numerics.arrays import Array, Array32
+from formation_env.numerics.jit import LANES, tile_function
 
-LINK_CLOSED: Final = field.plan("link_closed")
+LINK_CLOSED: Final = plan("link_closed")
 
 
-@inline_scalar
-def link(tile: Array, i: int, settings: Scalars) -> None:
+@tile_function
+def change(state: Array, work32: Array32, settings: Array, n: int) -> None:
     """One transition of the link's chain."""
-    down = settings.link_fail if tile[field.LINK_UP + i] > 0.5 else 1.0 - settings.link_recover
-    tile[field.LINK_UP + i] = 1.0 if tile[LINK_UNIFORM + i] >= down else 0.0
+    for i in range(min(n, LANES)):
+        chain = scalars(settings, i)
+        down = chain.link_fail if state[STATE.link_up + i] > 0.5 else 1.0 - chain.link_recover
+        state[STATE.link_up + i] = 1.0 if work32[WORK32.link_noise + i] >= down else 0.0
 
 
-@inline_scalar
-def dropout(tile: Array, i: int, settings: Scalars) -> None:
+@tile_function
+def receive(state: Array, work: Array, settings: Array, n: int) -> None:
     """Receive this instant's measurement or lose it, and update the age of the last one received."""
-    measured = tile[field.LINK_UP + i] * (1.0 - tile[LINK_CLOSED + i])
-    tile[field.MEASURED + i] = measured
-    tile[field.AGE + i] = 0.0 if measured > 0.5 else tile[field.AGE + i] + settings.dt_s
+    for i in range(min(n, LANES)):
+        measured = state[STATE.link_up + i] * (1.0 - work[LINK_CLOSED + i])
+        state[STATE.measured + i] = measured
+        age = state[STATE.measurement_age + i] + scalars(settings, i).dt_s
+        state[STATE.measurement_age + i] = 0.0 if measured > 0.5 else age

@@ -1,132 +1,152 @@
-"""Copies between the rows' memory and a tile: states in, states and results out, and the row of the schedule."""
+"""Copies from a tile to the arrays outside: results and observations, and the state of rows that begin."""
 
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_env.kernel import tile as field
-from formation_env.kernel.stages.noise import NUM_NORMALS
-from formation_env.kernel.tile import Width
-from formation_env.kernel.variants import column
-from formation_env.numerics.arrays import Array
+from formation_env.kernel.settings import scalars
+from formation_env.kernel.stages.plan import eight_from
+from formation_env.kernel.tile import (
+    FLAGS,
+    INTEGERS,
+    NOISES,
+    NUM_NOISES,
+    RESULTS,
+    SHOWN,
+    STATE,
+    WORK,
+    WORK32,
+    State,
+    Work,
+    plan,
+)
+from formation_env.numerics.arrays import Array, Array32
 from formation_env.numerics.jit import LANES, tile_function
+from formation_env.numerics.transpose import BLOCK, transpose_block
 from formation_env.task.observation import SIZE
 
-STATE_SIZE: Final = field.STATE_FIELDS * LANES
+Flags = NDArray[np.bool_]
+Integers = NDArray[np.int64]
+
+NUM_STATE: Final = sum(State())
+PHASE: Final = plan("phase")
+MEASURED, TERMINATED, TRUNCATED = FLAGS
+FROM_STATE: Final = RESULTS.thrust
+FROM_WORK: Final = RESULTS.reward + 1 - FROM_STATE
+TO_NOISE: Final = Work().measurement + Work().innovation
 
 
 @tile_function
-def load(tile: Array, width: Width, states: Array, index: int, actions: NDArray[np.float32], used: int) -> None:
-    """Load a tile's states and actions, and advance its step counters."""
-    for k in range(STATE_SIZE):
-        tile[k] = states[index, k]
-    for i in range(used):
-        for k in range(3):
-            tile[field.ACTION + k * LANES + i] = actions[index * LANES + i, k]
-    for i in range(len(width)):
-        tile[field.STEP + i] += 1.0
-
-
-@tile_function
-def store(
-    tile: Array,
-    width: Width,
-    states: Array,
-    index: int,
-    observations: NDArray[np.float32],
-    results: Array,
-    used: int,
-) -> None:
-    """Store a tile's states, observations and results."""
-    first = index * LANES
-    for k in range(STATE_SIZE):
-        states[index, k] = tile[k]
-    for i in range(used):
+def write_observations(work32: Array32, observations: Array32, first: int, n: int) -> None:
+    """Write a tile's observations as lines of (rows, SIZE) from row `first` on."""
+    flat = observations.reshape(-1)
+    whole = n - n % BLOCK
+    for i in range(0, whole, BLOCK):
+        for begin in range(0, SIZE, BLOCK):
+            k = min(begin, SIZE - BLOCK)
+            starts = eight_from(WORK32.observation + k * LANES + i, LANES)
+            transpose_block(work32, starts, flat, eight_from((first + i) * SIZE + k, SIZE))
+    for i in range(whole, n):
         for k in range(SIZE):
-            observations[first + i, k] = np.float32(tile[field.OBSERVATION + k * LANES + i])
-    for k in range(field.NUM_RESULTS):
-        for i in range(len(width)):
-            results[k, first + i] = tile[field.RESULTS + k * LANES + i]
+            flat[(first + i) * SIZE + k] = work32[WORK32.observation + k * LANES + i]
 
 
 @tile_function
-def load_streams(tile: Array, width: Width, states: Array, index: int) -> None:
-    """Load what the random numbers of a tile's last step come from: key, episode and step."""
-    for k in range(field.TRUTH):
-        tile[k] = states[index, k]
+def write_results(
+    state: Array, work: Array, results: Array, flags: Flags, integers: Integers, first: int, n: int
+) -> int:
+    """Write a tile's results in the columns from `first` on; return how many episodes ended."""
+    for k in range(FROM_STATE):
+        line = results[k, first:]  # from here on, so that the compiler sees that no index is negative
+        for i in range(min(n, LANES)):
+            line[i] = state[STATE.true_state + k * LANES + i]
+    for k in range(FROM_WORK):
+        line = results[FROM_STATE + k, first:]
+        for i in range(min(n, LANES)):
+            line[i] = work[WORK.thrust + k * LANES + i]
+    measured, terminated, truncated = flags[MEASURED, first:], flags[TERMINATED, first:], flags[TRUNCATED, first:]
+    phase, variant = integers[INTEGERS.phase, first:], integers[INTEGERS.variant, first:]
+    for i in range(min(n, LANES)):
+        measured[i] = state[STATE.measured + i] > 0.5
+    for i in range(min(n, LANES)):
+        phase[i] = np.int64(work[PHASE + i])
+    for i in range(min(n, LANES)):
+        variant[i] = np.int64(state[STATE.variant + i])
+    for i in range(min(n, LANES)):
+        terminated[i] = work[WORK.terminated + i] > 0.5
+    for i in range(min(n, LANES)):
+        truncated[i] = work[WORK.truncated + i] > 0.5
+    ended = 0
+    for i in range(min(n, LANES)):
+        ended += int((work[WORK.terminated + i] > 0.5) | (work[WORK.truncated + i] > 0.5))
+    return ended
 
 
 @tile_function
-def store_normals(tile: Array, width: Width, normals: Array, index: int) -> None:
-    """Store the standard normals of a tile's rows."""
-    for k in range(NUM_NORMALS):
-        for i in range(len(width)):
-            normals[k, index * LANES + i] = tile[field.NORMAL + k * LANES + i]
+def write_noises(work: Array, work32: Array32, settings: Array, noises: Array, first: int, n: int) -> None:
+    """Write what those who ask see of the random numbers, in the columns from `first` on."""
+    for k in range(TO_NOISE):
+        for i in range(n):
+            noises[NOISES.measurement + k, first + i] = work[WORK.measurement + k * LANES + i]
+    for k in range(3):
+        for i in range(n):
+            noises[NOISES.process_noise + k, first + i] = (
+                work[WORK.push + k * LANES + i] - work[WORK.thrust + k * LANES + i]
+            )
+    for i in range(n):
+        noises[NOISES.thrust_noise, first + i] = scalars(settings, i).thrust_noise * work32[WORK32.thrust_noise + i]
 
 
 @tile_function
-def gather(tile: Array, width: Width, states: Array, rows: NDArray[np.intp], first: int) -> None:
-    """Load the rows from `first` on side by side, and advance their episode counters."""
-    for i in range(len(width)):
-        source = min(first + i, len(rows) - 1)  # idle lanes repeat the last row
-        index, lane = rows[source] // LANES, rows[source] % LANES
-        for k in range(field.STATE_FIELDS):
-            tile[k * LANES + i] = states[index, k * LANES + lane]
-        tile[field.STEP + i] = 0.0
-        tile[field.EPISODE + i] += 1.0
-
-
-@tile_function
-def scatter(
-    tile: Array,
-    width: Width,
+def scatter_state(
+    spare: Array,
+    spare_stream: NDArray[np.uint32],
     states: Array,
+    streams: NDArray[np.uint32],
     rows: NDArray[np.intp],
     first: int,
-    observations: NDArray[np.float32],
-    results: Array,
+    n: int,
 ) -> None:
-    """Store the rows that `gather` loaded, with their observations and results."""
-    for i in range(min(len(width), len(rows) - first)):
-        row = rows[first + i]
-        for k in range(field.STATE_FIELDS):
-            states[row // LANES, k * LANES + row % LANES] = tile[k * LANES + i]
-        for k in range(SIZE):
-            observations[row, k] = np.float32(tile[field.OBSERVATION + k * LANES + i])
-        for k in range(field.NUM_RESULTS):
-            results[k, row] = tile[field.RESULTS + k * LANES + i]
+    """Put rows that begin, side by side in a spare tile, in their places."""
+    for i in range(n):
+        index, lane = rows[first + i] // LANES, rows[first + i] % LANES
+        for k in range(NUM_STATE):
+            states[index, k * LANES + lane] = spare[k * LANES + i]
+        for k in range(4):
+            streams[index, k * LANES + lane] = spare_stream[k * LANES + i]
 
 
 @tile_function
-def read_plan(tile: Array, width: Width, used: int, schedule: Array, known_step: int) -> int:
-    """Load the schedule's row of each row's step; usually all are at one step, which the tile may hold already.
+def scatter_results(
+    spare: Array,
+    work: Array,
+    work32: Array32,
+    observations: Array32,
+    results: Array,
+    flags: Flags,
+    integers: Integers,
+    rows: NDArray[np.intp],
+    first: int,
+    n: int,
+) -> None:
+    """Write what is shown of rows that begin; reward and ends stay those of the step before."""
+    for i in range(n):
+        row = rows[first + i]
+        for k in range(FROM_STATE):
+            results[k, row] = spare[STATE.true_state + k * LANES + i]
+        for k in range(FROM_STATE, SHOWN):
+            results[k, row] = work[WORK.thrust + (k - FROM_STATE) * LANES + i]
+        for k in range(SIZE):
+            observations[row, k] = work32[WORK32.observation + k * LANES + i]
+        flags[MEASURED, row] = spare[STATE.measured + i] > 0.5
+        integers[INTEGERS.phase, row] = np.int64(work[PHASE + i])
+        integers[INTEGERS.variant, row] = np.int64(spare[STATE.variant + i])
 
-    Args:
-        tile: the tile.
-        width: see `tile.Width`.
-        used: number of rows in the tile; the values of the idle ones do not matter.
-        schedule: the table (steps, columns).
-        known_step: the step whose row the whole tile holds, or -1.
 
-    Returns:
-        `known_step` after this call.
-    """
-    last = len(schedule) - 1
-    first = min(int(tile[field.STEP]), last)
-    same = True
-    for i in range(1, used):
-        same &= tile[field.STEP + i] == tile[field.STEP]
-    if same and first == known_step:
-        return first
-    if same:
-        for k in range(schedule.shape[1]):
-            value = schedule[first, k]
-            for i in range(len(width)):
-                tile[column(k) + i] = value
-        return first
-    for i in range(len(width)):
-        step = min(int(tile[field.STEP + i]), last)
-        for k in range(schedule.shape[1]):
-            tile[column(k) + i] = schedule[step, k]
-    return -1
+@tile_function
+def scatter_noises(work: Array, noises: Array, rows: NDArray[np.intp], first: int, n: int) -> None:
+    """Write the measurement and the innovation of rows that begin; there was no thrust."""
+    for i in range(n):
+        for k in range(NUM_NOISES):
+            noises[k, rows[first + i]] = work[WORK.measurement + k * LANES + i] if k < TO_NOISE else 0.0

@@ -1,53 +1,52 @@
-"""Random numbers of a step: uniforms and normals of each row's own stream."""
+"""Random numbers of a step: normals and a uniform of each row's own stream."""
 
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from formation_env.kernel import tile as field
-from formation_env.kernel.tile import Width
+from formation_env.kernel.tile import WORK32
 from formation_env.numerics import random_streams
-from formation_env.numerics.arrays import Array
-from formation_env.numerics.fastmath import to_bits, to_integer
+from formation_env.numerics.arrays import Array32
 from formation_env.numerics.jit import LANES, inline_scalar, tile_function
 
-NUM_NORMALS: Final = 10
-"""Standard normals drawn at an instant."""
-PROCESS_NORMALS: Final = slice(0, 3)
-SENSOR_NORMALS: Final = slice(3, 9)
-THRUST_NORMAL: Final = 9
-"""Normals that disturb the acceleration, the measurement and the thrust's magnitude."""
-FIRST_PROCESS_NOISE: Final = field.NORMAL
-FIRST_SENSOR_NOISE: Final = field.NORMAL + 3 * LANES
-THRUST_NOISE: Final = field.NORMAL + THRUST_NORMAL * LANES
-LINK_UNIFORM: Final = field.UNIFORM + NUM_NORMALS * LANES
+Stream = NDArray[np.uint32]
+
+STREAM_SIZE: Final = 4 * LANES
+NORMAL_PAIRS: Final = 5
+NORMALS: Final = WORK32.process_noise  # and those of the sensor and the thrust behind them
+_LOW: Final = np.uint64(0xFFFFFFFF)
+_SHIFT: Final = np.uint64(32)
 
 
 @inline_scalar
-def draw_uniforms(tile: Array, i: int, block: int, first_block: int) -> None:
-    """Four uniforms of the row's stream: block 0, 1, 2 of the twelve."""
-    counter = to_integer(random_streams.BLOCKS_PER_STEP * tile[field.STEP + i]) + np.uint64(first_block + block)
-    a, b = random_streams.threefry2x64(
-        to_bits(tile[field.KEY + i]), to_bits(tile[field.KEY + LANES + i]), counter, to_integer(tile[field.EPISODE + i])
+def _next_word(stream: Stream, i: int) -> np.uint32:
+    word, (s0, s1, s2, s3) = random_streams.next_word(
+        stream[i], stream[LANES + i], stream[2 * LANES + i], stream[3 * LANES + i]
     )
-    u = field.UNIFORM + 4 * block * LANES + i
-    tile[u], tile[u + LANES] = random_streams.uniform_pair(a)
-    tile[u + 2 * LANES], tile[u + 3 * LANES] = random_streams.uniform_pair(b)
-
-
-@inline_scalar
-def draw_normals(tile: Array, i: int, pair: int) -> None:
-    """Two standard normals from two uniforms: pair 0 to 4."""
-    u, v = field.UNIFORM + 2 * pair * LANES + i, field.NORMAL + 2 * pair * LANES + i
-    tile[v], tile[v + LANES] = random_streams.normal_pair(tile[u], tile[u + LANES])
+    stream[i], stream[LANES + i], stream[2 * LANES + i], stream[3 * LANES + i] = s0, s1, s2, s3
+    return word
 
 
 @tile_function
-def draw(tile: Array, width: Width, first_block: int) -> None:
+def draw(stream: Stream, work32: Array32, n: int) -> None:
     """Draw the random numbers of an instant from the rows' streams."""
-    for block in range(3):
-        for i in range(len(width)):
-            draw_uniforms(tile, i, block, first_block)
-    for pair in range(5):
-        for i in range(len(width)):
-            draw_normals(tile, i, pair)
+    for pair in range(NORMAL_PAIRS):
+        first = NORMALS + 2 * pair * LANES
+        for i in range(min(n, LANES)):
+            a = _next_word(stream, i)
+            b = _next_word(stream, i)
+            work32[first + i], work32[first + LANES + i] = random_streams.normal_pair(a, b)
+    for i in range(min(n, LANES)):
+        work32[WORK32.link_noise + i] = random_streams.uniform(_next_word(stream, i))
+
+
+@tile_function
+def begin_streams(stream: Stream, keys: NDArray[np.uint64], rows: NDArray[np.intp], first: int, n: int) -> None:
+    """Set the streams for the rows' next episodes; a row of `keys` is its key (2) and the number of its episode."""
+    for i in range(n):
+        key = keys[rows[first + i]]
+        a, b = random_streams.threefry2x64(key[0], key[1], np.uint64(0), key[2])
+        stream[i], stream[LANES + i] = np.uint32(a & _LOW), np.uint32(a >> _SHIFT)
+        stream[2 * LANES + i], stream[3 * LANES + i] = np.uint32(b & _LOW), np.uint32(b >> _SHIFT)
+        key[2] += np.uint64(1)

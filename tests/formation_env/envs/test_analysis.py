@@ -21,8 +21,9 @@ def test_noises_explain_the_flight(name: str) -> None:
     scenario = dataclasses.replace(load_scenario(name), domain_randomization=None)
     env, rows = FormationVectorEnv(40, scenario, analysis=True), 40
     plain = FormationVectorEnv(rows, scenario)
-    infos = [env.reset(seed=2)[1]]
-    assert_same(plain.reset(seed=2)[0], env._observations)
+    start, first = env.reset(seed=2)
+    infos = [first]
+    assert_same(plain.reset(seed=2)[0], start)
     assert not infos[0]["process_noise_m_s2"].any()
     for action in random_actions(3, 20, rows):
         result, expected = env.step(0.1 * action), plain.step(0.1 * action)
@@ -30,7 +31,9 @@ def test_noises_explain_the_flight(name: str) -> None:
         infos.append(result[4])
     keys = set(infos[-1]) - set(expected[4])
     assert keys == {
-        f"{mask}{key}" for mask in ("", "_") for key in ("measurement", "process_noise_m_s2", "thrust_noise")
+        f"{mask}{key}"
+        for mask in ("", "_")
+        for key in ("measurement", "innovation", "process_noise_m_s2", "thrust_noise")
     }
     errors = np.array([info["measurement"] - info["true_state"] for info in infos])
     for sigma, part in (
@@ -63,7 +66,7 @@ def test_a_position_sensor_measures_positions() -> None:
     batch, single = FormationVectorEnv(2, scenario, analysis=True), FormationEnv(scenario, analysis=True)
     rows, (_, info) = batch.reset(seed=4)[1], single.reset(seed=4)
     assert rows["measurement"].shape == (2, 3)
-    for key in ("measurement", "process_noise_m_s2", "thrust_noise"):
+    for key in ("measurement", "innovation", "process_noise_m_s2", "thrust_noise"):
         np.testing.assert_array_equal(rows[key][0], info[key])
 
 

@@ -183,8 +183,9 @@ def test_errors_after_an_early_end_are_those_at_the_limit() -> None:
     table = evaluate(Damper(0.0), dataclasses.replace(scenario, start=start, limits=limits), range(30))
     early = table["steps"] < scenario.num_steps
     assert 0 < early.sum() < 30
-    assert (table.loc[early, "position_error_final_m"] == 50_000).all()
-    assert (table.loc[early, "position_error_max_m"] == 50_000).all()
+    finals = table.loc[early, ["position_error_final_m", "position_error_max_m"]]
+    assert ((finals >= 50_000) & (finals < 50_500)).all(axis=None)  # beyond the limit by a step at most
+    assert (finals == 50_000).any(axis=None)
     assert (table.loc[early, "position_error_mean_m"] > 1000).all()
     assert (table.loc[~early, ["position_error_final_m", "position_error_max_m"]] < 50_000).all(axis=None)
 

@@ -168,9 +168,10 @@ def test_filter_is_consistent(scenario: Scenario) -> None:
 
     Also through outages, with thrust, and with random starts (Bar-Shalom, Li & Kirubarajan 2001, section 5.4).
     """
-    env, measurable = FormationVectorEnv(ROWS, scenario), 6 if scenario.sensor.measures != "position" else 3
+    rows = 8 * ROWS
+    env, measurable = FormationVectorEnv(rows, scenario), 6 if scenario.sensor.measures != "position" else 3
     results = [env.reset(seed=1)]
-    for actions in 0.3 * random_actions(2, 100, ROWS):
+    for actions in 0.3 * random_actions(2, 100, rows):
         infos = results[-1][-1]
         error = infos["estimate"] - infos["true_state"]
         assert_chi2(np.einsum("ri,rij,rj->r", error, np.linalg.inv(covariances(env)), error), 6)

@@ -2,7 +2,6 @@
 
 import ast
 import dataclasses
-import itertools
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,9 +14,11 @@ from env_helpers import assert_same, random_actions
 import formation_env
 from formation_env import FormationVectorEnv, load_scenario, scenario_names
 from formation_env.dynamics import NONLINEAR
-from formation_env.kernel import packing, program, tile, unpacking
+from formation_env.kernel import packing, program, tile
+from formation_env.kernel import settings as line
 from formation_env.kernel.simulation import Simulation
 from formation_env.navigation.filter_settings import KalmanFilter
+from formation_env.numerics.jit import LANES
 from formation_env.task.observation import SIZE
 
 PACKAGE = Path(formation_env.__file__).parent
@@ -28,21 +29,29 @@ TREES = {
 
 
 @numba.njit
-def unpacked(settings):  # type: ignore[no-untyped-def]
-    """All tuples that `unpack` gives, in the order in which `pack` writes them."""
-    return unpacking.unpack(settings)
+def read_all(settings):  # type: ignore[no-untyped-def]
+    """All tuples of a line of settings, in the order in which `pack` writes them."""
+    return (
+        line.model(settings, line.TRUTH, 0),
+        line.model(settings, line.FILTER, 0),
+        line.process_noise(settings, line.FILTER, 0),
+        line.forces(settings, 0),
+        line.scalars(settings, 0),
+    )
 
 
 @pytest.mark.parametrize("name", scenario_names())
-def test_unpack_reads_what_pack_wrote(name: str) -> None:
+def test_the_step_reads_what_pack_wrote(name: str) -> None:
     """The same numbers in the same named places, for every element."""
     filter_model = KalmanFilter(dynamics="hcw", sigma_pos_m=3.0, process_noise_m_s2=1e-4)
     scenario = dataclasses.replace(load_scenario(name), filter=filter_model)
     settings = packing.pack(scenario)
-    groups = unpacked(settings)
+    groups = read_all(settings[None])
+    own = np.repeat(settings, LANES)
+    assert read_all(own) == groups  # a row's own line gives the same
     flat = np.concatenate([np.ravel(values) for group in groups for values in group])
     np.testing.assert_array_equal(flat, settings)
-    truth, believed, _, sensor, _, scalars = groups
+    truth, believed, _, _, scalars = groups
     models = [(believed, scenario.filter_dynamics())]
     if scenario.dynamics != NONLINEAR:
         models.append((truth, scenario.true_dynamics()))
@@ -54,31 +63,32 @@ def test_unpack_reads_what_pack_wrote(name: str) -> None:
         Gamma[[2, 5], 2] = model.Gamma_cross_track
         np.testing.assert_array_equal(Phi, expected.Phi)
         np.testing.assert_array_equal(Gamma, expected.Gamma)
-    assert sensor.variances == (9.0, scenario.sensor.sigma_vel_m_s**2)
+    assert (scalars.filter_variance_pos, scalars.filter_variance_vel) == (9.0, scenario.sensor.sigma_vel_m_s**2)
     assert scalars._asdict() == packing._scalars(scenario)._asdict()
     assert scalars.dt_s == scenario.dt_s
     assert scalars.num_steps == scenario.num_steps
     assert scalars.max_accel == scenario.spacecraft.max_accel_m_s2
 
 
-def test_fields_of_the_tile_do_not_overlap() -> None:
-    """Each field has its own lanes, and the results are those that the environments read."""
-    lanes = formation_env.numerics.jit.LANES
-    sizes = {"TRUTH": 6, "ESTIMATE": 6, "P_IN_PLANE": 10, "P_CROSS_TRACK": 3, "KEY": 2, "THRUST": 3, "ACTION": 3}
-    spans = [
-        (value, value + sizes.get(name, 1) * lanes)
-        for name, value in vars(tile).items()
-        if name.isupper()
-        and name not in ("LANES", "STATE_FIELDS", "NUM_RESULTS", "TILE_FIELDS", "RESULTS", "FIRST_TOTAL", "NUM_TOTALS")
-        and isinstance(value, int)
-    ]
-    spans.sort()
-    assert all(end <= start for (_, end), (start, _) in itertools.pairwise(spans))
-    named = [
-        *tile.STATES.values(),
-        *(span._replace(first=span.first + tile.RESULTS // lanes) for span in tile.STEP_RESULTS.values()),
-    ]
-    assert {(first * lanes, (first + size) * lanes) for first, size in named} <= set(spans)
+@pytest.mark.parametrize("layout", ["State", "Work", "Work32", "Results", "Flags", "Integers", "Noises"])
+def test_fields_of_a_layout_do_not_overlap(layout: str) -> None:
+    """Each field begins where the one before ends, in lanes or in lines of a block."""
+    sizes, offsets = getattr(tile, layout)(), getattr(tile, layout.upper())
+    unit = LANES if layout in ("State", "Work", "Work32") else 1
+    assert offsets[0] == 0
+    for (name, offset), size, behind in zip(offsets._asdict().items(), sizes, offsets[1:], strict=False):
+        assert offset + size * unit == behind, name
+
+
+def test_results_stand_in_the_order_in_which_they_are_written() -> None:
+    """`write_results` copies runs of fields: state and estimate from the state, the rest from scratch space."""
+    fields = tile.Results._fields
+    assert fields[:2] == tile.State._fields[:2]
+    begin = tile.Work._fields.index(fields[2])
+    assert fields[2:] == tile.Work._fields[begin : begin + len(fields) - 2]
+    assert tile.Noises._fields[:2] == ("measurement", "innovation")
+    begin = tile.Work._fields.index("measurement")
+    assert tile.Work._fields[begin : begin + 2] == ("measurement", "innovation")
 
 
 def test_rows_of_the_padding_do_not_show() -> None:
@@ -105,7 +115,9 @@ def imported_modules(tree: ast.AST) -> dict[str, str]:
 def is_compiled(function: ast.FunctionDef) -> bool:
     """Whether numba compiles a function, by its decorator."""
     names = {node.id for item in function.decorator_list for node in ast.walk(item) if isinstance(node, ast.Name)}
-    return bool(names & {"inline_scalar", "tile_function", "python_and_compiled", "compiled", "numba"})
+    return bool(
+        names & {"inline_scalar", "tile_function", "python_and_compiled", "compiled_program", "numba", "intrinsic"}
+    )
 
 
 def names_at_work(tree: ast.Module) -> Iterator[str]:
@@ -142,6 +154,7 @@ def test_the_hash_covers_all_that_is_compiled() -> None:
         "kernel/kalman",
         "numerics/random_streams",
         "numerics/fastmath",
+        "numerics/single_precision",
     } <= with_functions
     assert with_functions <= covered
     for name in with_functions:
@@ -154,6 +167,7 @@ def test_the_hash_covers_all_that_is_compiled() -> None:
 SOURCES = (
     "kernel/tile",
     "kernel/stages/true_motion",
+    "kernel/settings",
     "numerics/jit",
     "orbital/constants",
     "orbital/accelerations",
@@ -178,15 +192,15 @@ def test_the_hash_changes_with_each_source(tmp_path: Path, monkeypatch: pytest.M
 def test_the_program_carries_the_hash_of_its_sources() -> None:
     """The key is what the sources on the disk give: an equal checkout finds the cache, another does not."""
     assert program._source_hash() == program._source_hash()
-    assert 0 <= program._source_hash() < 2**63
+    assert len(program._source_hash()) == 64
 
 
-@pytest.mark.parametrize("varied", [False, True])
-def test_programs_close_over_numbers_only(varied: bool) -> None:
-    """numba's cache takes what a function closes over into its key; a function there is another in each process."""
-    for function in program.program(packing.TIME_INVARIANT, packing.TIME_INVARIANT, varied):
-        cells = [cell.cell_contents for cell in function.py_func.__closure__]
-        assert all(type(cell) in (int, bool) for cell in cells)
+def test_the_key_of_the_cache_is_the_same_in_each_process() -> None:
+    """A program closes over functions, which are new in each process: its key holds names and a hash alone."""
+    kinds = program.kinds_of(load_scenario("keeping"), 1)
+    for function in program.program(kinds):
+        chosen = () if function.py_func.__name__ == "look" else (kinds,)
+        assert function._cache._key == (function.py_func.__name__, *chosen, program._source_hash())
 
 
 def test_reset_writes_the_rows_asked_for_only() -> None:
@@ -218,7 +232,7 @@ def test_read_takes_names_and_rows() -> None:
     assert simulation.read("measured", rows, bool).dtype == bool
     assert simulation.read("covariance_in_plane", rows).shape == (3, 10)
     assert (simulation.read("step") == 1).all()
-    with pytest.raises(KeyError, match=r"unknown name 'positon'; known: thrust, .*true_state"):
+    with pytest.raises(KeyError, match=r"unknown name 'positon'; known: true_state, .*thrust"):
         simulation.read("positon")
 
 
@@ -228,20 +242,23 @@ def test_nobody_outside_the_kernel_knows_its_offsets() -> None:
     paths = [
         path for folder in ("formation_env", "baselines", "agents") for path in (repository / folder).rglob("*.py")
     ]
-    outside = [path for path in paths if "kernel" not in path.parts and path.name != "jit.py"]
+    outside = [path for path in paths if "formation_env/kernel" not in path.as_posix() and path.name != "jit.py"]
     assert len(outside) > 100
     text = {path: path.read_text(encoding="utf-8") for path in outside}
     assert not [path for path, source in text.items() if "LANES" in source or "kernel import tile" in source]
 
 
-def test_drawing_again_changes_no_flight() -> None:
-    """The noises of a step are read, and the flight goes on as if they were not; twice the same."""
-    env, untouched = FormationVectorEnv(40), FormationVectorEnv(40)
+def test_reading_the_noises_changes_no_flight() -> None:
+    """A simulation that writes its noises flies as one that does not; and they are what moved it."""
+    env, untouched = FormationVectorEnv(70, analysis=True), FormationVectorEnv(70)
     env.reset(seed=0)
     untouched.reset(seed=0)
-    for action in random_actions(1, 3, 40):
-        assert_same(env.step(action), untouched.step(action))
-        for one, other in zip(env.simulation.step_noises(), env.simulation.step_noises(), strict=True):
-            np.testing.assert_array_equal(one, other)
-        some = env.simulation.step_noises(np.array([39, 2]))
-        np.testing.assert_array_equal(some.measurement, env.simulation.step_noises().measurement[[39, 2]])
+    for action in random_actions(1, 3, 70):
+        before = env.simulation.read("estimate")
+        outputs, others = env.step(action), untouched.step(action)
+        infos = {name: value for name, value in outputs[4].items() if name in others[4]}
+        assert_same((*outputs[:4], infos), others)
+        noises = {name: outputs[4][name] for name in ("measurement", "innovation", "process_noise_m_s2")}
+        assert all(np.isfinite(value).all() for value in noises.values())
+        predicted = noises["measurement"] - noises["innovation"]
+        assert 0 < np.abs(predicted - before)[:, :3].max() < 1e3

@@ -1,4 +1,4 @@
-"""The counter-based random numbers: published vectors, and the distributions that the simulation needs.
+"""The random numbers of the rows: published vectors, and the distributions that the simulation needs.
 
 Keys are fixed, so every test gives the same p-value on each run; P_LOW is what chance alone would fall below once in a
 thousand tests.
@@ -12,10 +12,14 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
+from formation_env.kernel.stages.noise import STREAM_SIZE, begin_streams
 from formation_env.numerics import random_streams
+from formation_env.numerics.jit import LANES
 
 Array = NDArray[np.float64]
+Array32 = NDArray[np.float32]
 Words = NDArray[np.uint64]
+Words32 = NDArray[np.uint32]
 P_LOW = 1e-3
 KEYS = [(1, 2), (0xDEADBEEF, 1 << 63), (0, 0)]
 ONES = 2**64 - 1
@@ -32,37 +36,59 @@ def words_at(key0: np.uint64, key1: np.uint64, counter0: Words, counter1: Words)
 
 
 @numba.njit
-def uniforms_of(words: Words) -> Array:
-    """Uniforms (N, 2) of each of N words."""
-    out = np.empty((len(words), 2))
-    for i in range(len(words)):
-        out[i, 0], out[i, 1] = random_streams.uniform_pair(words[i])
+def words_of(state: tuple[np.uint32, ...], count: int) -> Words32:
+    """The next words of a stream."""
+    out = np.empty(count, np.uint32)
+    for k in range(count):
+        out[k], state = random_streams.next_word(state[0], state[1], state[2], state[3])
     return out
 
 
 @numba.njit
-def normals_of(uniforms: Array) -> Array:
-    """Normals (N, 2) of pairs of uniforms (N, 2)."""
-    out = np.empty_like(uniforms)
-    for i in range(len(uniforms)):
-        out[i, 0], out[i, 1] = random_streams.normal_pair(uniforms[i, 0], uniforms[i, 1])
+def uniforms_of(words: Words32) -> Array32:
+    """A uniform of each word."""
+    out = np.empty(len(words), np.float32)
+    for i in range(len(words)):
+        out[i] = random_streams.uniform(words[i])
     return out
 
 
-def words(key: tuple[int, int], count: int) -> Words:
-    """Words (count, 2) of a key at the counters 0, 1, 2, ..."""
-    counters = np.arange(count, dtype=np.uint64)
-    return words_at(np.uint64(key[0]), np.uint64(key[1]), counters, np.zeros_like(counters))
+@numba.njit
+def normals_of(words: Words32) -> Array32:
+    """Normals (N, 2) of pairs of words (N, 2)."""
+    out = np.empty(words.shape, np.float32)
+    for i in range(len(words)):
+        out[i, 0], out[i, 1] = random_streams.normal_pair(words[i, 0], words[i, 1])
+    return out
 
 
-def uniforms(key: tuple[int, int], count: int) -> Array:
-    """Uniforms (count, 4): the four of each counter."""
-    return uniforms_of(words(key, count).ravel()).reshape(count, 4)
+@numba.njit
+def begin(state: Words32, keys: Words) -> None:
+    begin_streams(state, keys, np.zeros(1, np.intp), 0, 1)
+
+
+def stream(key: tuple[int, int], episode: int = 0) -> tuple[np.uint32, ...]:
+    """The state of a key's stream at the start of an episode, as the reset makes it."""
+    keys = np.array([[*key, episode]], np.uint64)
+    state = np.zeros(STREAM_SIZE, np.uint32)
+    begin(state, keys)
+    assert keys[0, 2] == episode + 1
+    return tuple(state[::LANES])
+
+
+def words(key: tuple[int, int], count: int, episode: int = 0) -> Words32:
+    """The first words of a key's stream."""
+    return words_of(stream(key, episode), count)
+
+
+def uniforms(key: tuple[int, int], count: int, episode: int = 0) -> Array:
+    """Uniforms (count, 4), four after four."""
+    return uniforms_of(words(key, 4 * count, episode)).reshape(count, 4).astype(float)
 
 
 def normals(key: tuple[int, int], count: int) -> Array:
-    """Normals (count, 4): the four of each counter."""
-    return normals_of(uniforms(key, count).reshape(-1, 2)).reshape(count, 4)
+    """Normals (count, 4), four after four."""
+    return normals_of(words(key, 4 * count).reshape(-1, 2)).reshape(count, 4).astype(float)
 
 
 def assert_uncorrelated(first: Array, second: Array) -> None:
@@ -112,22 +138,39 @@ def test_stream_keys_follow_their_generator() -> None:
 
 @pytest.mark.parametrize("key", KEYS)
 def test_uniforms_are_uniform(key: tuple[int, int]) -> None:
-    """Kolmogorov-Smirnov for each of the four of a counter, and for all."""
+    """Kolmogorov-Smirnov for each of four in turn, and for all."""
     sample = uniforms(key, 100_000)
     assert min(stats.kstest(column, "uniform").pvalue for column in sample.T) > P_LOW
     assert stats.kstest(sample.ravel(), "uniform").pvalue > P_LOW
 
 
-def test_uniforms_never_reach_0_or_1() -> None:
-    """The smallest and largest 32 bits give the centres of the first and last of 2^32 cells, exactly."""
-    extremes = uniforms_of(np.array([0, ONES], np.uint64))
-    np.testing.assert_array_equal(extremes, [[2.0**-33] * 2, [1 - 2.0**-33] * 2])
-    np.testing.assert_array_equal(uniforms_of(np.array([1], np.uint64)), [[2.0**-33, 3 * 2.0**-33]])
+def test_uniforms_never_reach_1() -> None:
+    """The upper 24 bits count: 0 and 1 - 2^-24 are the extremes, so a loss of 0 or 1 is certain."""
+    extremes = uniforms_of(np.array([0, 255, 256, 2**32 - 1], np.uint32))
+    np.testing.assert_array_equal(extremes, [0, 0, 2.0**-24, 1 - 2.0**-24])
+
+
+def test_the_stream_is_xoshiro() -> None:
+    """The first ten words of xoshiro128++ from the state (1, 2, 3, 4), as other implementations publish them."""
+    state = tuple(np.uint32(k) for k in (1, 2, 3, 4))
+    expected = [
+        641,
+        1573767,
+        3222811527,
+        3517856514,
+        836907274,
+        4247214768,
+        3867114732,
+        1355841295,
+        495546011,
+        621204420,
+    ]
+    np.testing.assert_array_equal(words_of(state, 10), expected)
 
 
 @pytest.mark.parametrize("key", KEYS)
 def test_normals_are_normal(key: tuple[int, int]) -> None:
-    """Kolmogorov-Smirnov for each of the four of a counter; Cramer-von Mises for all."""
+    """Kolmogorov-Smirnov for each of four in turn; Cramer-von Mises for all."""
     sample = normals(key, 100_000)
     assert min(stats.kstest(column, "norm").pvalue for column in sample.T) > P_LOW
     assert stats.cramervonmises(sample.ravel(), "norm").pvalue > P_LOW
@@ -149,25 +192,26 @@ def test_tails_of_the_normals(sigmas: float) -> None:
         assert stats.binomtest(int(count), sample.size, stats.norm.sf(sigmas)).pvalue > P_LOW
 
 
-def test_normals_end_where_the_smallest_uniform_puts_them() -> None:
-    """sqrt(-2 ln 2^-33) = 6.764 sigma, and finite at every corner of the unit square."""
-    corners = np.array([[u, v] for u in (2.0**-33, 1 - 2.0**-33) for v in (2.0**-33, 0.25, 0.5, 1 - 2.0**-33)])
+def test_normals_end_where_the_smallest_word_puts_them() -> None:
+    """sqrt(-2 ln 2^-32) = 6.66 sigma, and finite at every corner of the square."""
+    extremes = np.array([0, 1, 2**31 - 1, 2**31, 2**32 - 1], np.uint32)
+    corners = np.array([[u, v] for u in extremes for v in extremes])
     sample = normals_of(corners)
     assert np.isfinite(sample).all()
-    assert np.abs(sample).max() == pytest.approx(np.sqrt(66 * np.log(2)), rel=1e-9)
+    assert np.abs(sample).max() == pytest.approx(np.sqrt(64 * np.log(2)), rel=1e-6)
 
 
 @pytest.mark.parametrize("draw", [uniforms, normals])
-def test_numbers_of_one_counter_are_independent(draw: Callable[[tuple[int, int], int], Array]) -> None:
-    """Each pair of a counter's four, as values and as distances from the middle: no sine without its cosine shows."""
+def test_neighbours_are_independent(draw: Callable[[tuple[int, int], int], Array]) -> None:
+    """Each pair of four in turn, as values and as distances from the middle: no sine without its cosine shows."""
     sample = draw((7, 8), 100_000)
     for i, j in zip(*np.triu_indices(4, 1), strict=True):
         assert_uncorrelated(sample[:, i], sample[:, j])
 
 
 @pytest.mark.parametrize("lag", [1, 2, 8, 64])
-def test_neighbouring_counters_are_independent(lag: int) -> None:
-    """What one step or row draws says nothing about the next."""
+def test_steps_are_independent(lag: int) -> None:
+    """What a stream gives says nothing about what it gives later."""
     sample = uniforms((9, 10), 100_000)
     for column in sample.T:
         assert_uncorrelated(column[:-lag], column[lag:])
@@ -181,8 +225,16 @@ def test_neighbouring_keys_are_independent(other: tuple[int, int]) -> None:
         assert_uncorrelated(left, right)
 
 
+@pytest.mark.parametrize("episode", [1, 2, 2**32])
+def test_episodes_are_independent(episode: int) -> None:
+    """A row's next episode has nothing of the one before."""
+    first, second = uniforms((15, 16), 100_000), uniforms((15, 16), 100_000, episode)
+    for left, right in zip(first.T, second.T, strict=True):
+        assert_uncorrelated(left, right)
+
+
 def test_pairs_fill_the_square() -> None:
-    """Chi-squared over 32 x 32 cells, of a counter's first number and of its neighbour's."""
+    """Chi-squared over 32 x 32 cells, of every fourth number and the next such."""
     first = uniforms((13, 14), 400_001)[:, 0]
     counts, _, _ = np.histogram2d(first[:-1], first[1:], bins=32, range=[[0, 1], [0, 1]])
     assert stats.chisquare(counts.ravel()).pvalue > P_LOW
