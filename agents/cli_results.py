@@ -1,4 +1,4 @@
-"""The commands about trained policies: evaluate, export, plot-curves and bench."""
+"""The commands about trained policies: evaluate, export, renew, plot-curves and bench."""
 
 from pathlib import Path
 from typing import Annotated
@@ -25,6 +25,7 @@ def add_result_commands(app: typer.Typer) -> None:
     """Add the commands to a group."""
     app.command(epilog=f"Example: {PROGRAM} evaluate runs/mine --episodes 20")(evaluate)
     app.command(epilog=f"Example: {PROGRAM} export runs/a runs/b runs/c --out policies")(export)
+    app.command(epilog=f"Example: {PROGRAM} renew policies/ppo_keeping.safetensors")(renew)
     app.command("plot-curves", epilog=f"Example: {PROGRAM} plot-curves runs/mine --out curves")(plot_curves)
     app.command(epilog=f"Example: {PROGRAM} bench FormationKeeping-v0 --threads 1")(bench)
 
@@ -72,6 +73,24 @@ def export(
     folder = out or SHIPPED
     check_writable(folder)
     typer.echo(export_runs(runs, folder))
+
+
+def renew(
+    policies: Annotated[
+        list[Path] | None, typer.Argument(help="Policies (.safetensors).", show_default="the shipped ones")
+    ] = None,
+) -> None:
+    """Fly exported policies again after a change of the environment, and renew the test results of their cards."""
+    from agents.policy.library import shipped_paths
+    from agents.results.export import renew as renew_card
+    from formation_env.settings import ConfigError
+
+    if policies is None and not is_checkout():
+        raise ConfigError("renew: the shipped policies belong to the installed package; name a policy of your own")
+    for path in policies or shipped_paths():
+        check_writable(path.parent)
+        renew_card(path)
+        typer.echo(path)
 
 
 def plot_curves(

@@ -67,7 +67,8 @@ class Card:
         env: registered id with its version, or a scenario's name or path.
         observation_size: length of the observation that it reads.
         sha256: of the file of tensors.
-        test: metric -> mean and interval on the test seeds, bootstrap over episodes.
+        test: metric -> mean and interval on the test seeds, bootstrap over episodes; flown again (`agents renew`) when
+            the environment's random numbers change, which leaves `runs` as they were measured.
         test_episodes: number of test seeds, from the first on.
         first_test_costs_m_s: costs on the first of them, m/s, for checks.
         cost_over_runs_m_s: mean test cost of all training runs, with Student's interval over runs; none for one run.

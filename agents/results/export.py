@@ -3,7 +3,7 @@
 import itertools
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -12,7 +12,7 @@ import pandas as pd
 from scipy import stats
 
 from agents.policy.actor import Actor, read_actor, to_bytes
-from agents.policy.library import CARD, GRAPH, TENSORS, Card, Interval, Trained, policy_name, sha256
+from agents.policy.library import CARD, GRAPH, TENSORS, Card, Interval, Trained, load_with_card, policy_name, sha256
 from agents.policy.onnx_export import to_onnx
 from agents.training.run_folder import START, Run, load_best, read_curve, read_pretraining
 from formation_env.evaluation.rollout import evaluate
@@ -70,10 +70,36 @@ def export(folders: Sequence[Path], out: Path) -> Path:
     tensors = to_bytes(best.actor)
     card = _card(candidates, tensors)
     name = policy_name(best.run.algorithm, best.run.env)
-    text = json.dumps(asdict(card), indent=2, allow_nan=False) + "\n"
-    files = {TENSORS: tensors, CARD: text.encode(), GRAPH: to_onnx(best.actor)}
+    files = {TENSORS: tensors, CARD: _written(card), GRAPH: to_onnx(best.actor)}
     write_files(out, {f"{name}{ending}": content for ending, content in files.items()})
     return out / f"{name}{TENSORS}"
+
+
+def renew(path: Path) -> None:
+    """Fly a policy on the test seeds again, after a change of the environment, and renew its card's test results.
+
+    What the card says of the training runs stays: their policies are not at hand.
+
+    Args:
+        path: of the tensors.
+
+    Raises:
+        ConfigError: faulty files, or the card's environment is another one now; one line.
+        OSError: the card cannot be written; it is unchanged then.
+    """
+    actor, card = load_with_card(path)
+    episodes = evaluate(actor, card.scenario, seeds("test", card.test_episodes))
+    write_files(path.parent, {path.with_suffix(CARD).name: _written(_tested(card, episodes))})
+
+
+def _tested(card: Card, episodes: pd.DataFrame) -> Card:
+    """The card with the results of its test episodes."""
+    costs = -episodes["return"].to_numpy(float)
+    return replace(card, test=_intervals(episodes), first_test_costs_m_s=tuple(costs[:LISTED_EPISODES].tolist()))
+
+
+def _written(card: Card) -> bytes:
+    return (json.dumps(asdict(card), indent=2, allow_nan=False) + "\n").encode()
 
 
 def _open(folders: Sequence[Path]) -> list[tuple[Path, Run, Actor]]:
