@@ -247,3 +247,16 @@ def test_runs_that_do_not_belong_together_are_refused(runs: list[Path], tmp_path
         assert fault in result.stderr
         assert result.stderr.count("\n") == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_card_is_renewed_by_flying_again(copy: Path) -> None:
+    """Test results of another environment's numbers are replaced; what is said of the training runs stays."""
+    card = copy.with_suffix(CARD)
+    right = json.loads(card.read_text(encoding="utf-8"))
+    stale = json.loads(card.read_text(encoding="utf-8"))
+    stale["first_test_costs_m_s"] = [1.0] * 5
+    stale["test"]["return"] = {"mean": -1.0, "low": -1.0, "high": -1.0}
+    card.write_text(json.dumps(stale), encoding="utf-8")
+    result = CliRunner().invoke(app, ["renew", str(copy)])
+    assert result.exit_code == 0, result.output
+    assert json.loads(card.read_text(encoding="utf-8")) == right
