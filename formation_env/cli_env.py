@@ -193,6 +193,7 @@ def _make_policy(name: str | None, scenario: "Scenario") -> "Policy | None":
 def bench(
     envs: Envs = None,
     rows: Annotated[int, typer.Option(min=1, max=1_000_000, help="Rows of the batched environment.")] = 4096,
+    rivals: Annotated[bool, typer.Option("--rivals", help="Also those of other packages that are installed.")] = False,
 ) -> None:
     """Measure environment steps per second, next to Gymnasium's own environments in the same run."""
     from formation_env.evaluation import bench as benchmark
@@ -203,6 +204,10 @@ def bench(
         load_scenario(env)
     for name, seconds in benchmark.startup().items():
         typer.echo(f"{name:20s} {seconds:6.2f} s")
-    table = benchmark.table(rows, chosen)
-    formats = {"steps_per_s": "{:,.0f}".format, "x_cartpole": "{:.2f}".format}
-    typer.echo(table.to_string(index=False, formatters=formats))
+    formats = {"steps_per_s": "{:,.0f}".format, "x_cartpole": "{:.3f}".format}
+    typer.echo(benchmark.table(rows, chosen).to_string(index=False, formatters=formats))
+    if rivals:
+        others, left_out = benchmark.beside_rivals(chosen[0])
+        typer.echo("\n".join(left_out))
+        if len(others):
+            typer.echo(others.to_string(index=False, formatters=formats))

@@ -10,6 +10,7 @@ from typing import Any, Final
 import gymnasium
 import pandas as pd
 
+from formation_env.evaluation import rivals
 from formation_env.registration import ENV_IDS
 
 REFERENCE: Final = "CartPole-v1"
@@ -99,6 +100,28 @@ def startup() -> dict[str, float]:
     return dict(zip(("import", "first single step", "first batched step"), map(float, output.split()), strict=True))
 
 
+def beside_rivals(env: str) -> tuple[pd.DataFrame, list[str]]:
+    """Batched steps per second beside other packages that are installed, each in a batch of its own size.
+
+    Args:
+        env: as of `single_stepper`.
+
+    Returns:
+        A table as `table` gives it, and a line for each package that is left out.
+    """
+    groups, left_out = rivals.make_steppers()
+    measured = [
+        (
+            f"batch of {rows}",
+            rates(
+                {**{name: batch_stepper(name, rows, _BATCH_STEPS) for name in (env, REFERENCE)}, **group}, _BATCH_ROUNDS
+            ),
+        )
+        for rows, group in groups.items()
+    ]
+    return _lines(measured), left_out
+
+
 def table(rows: int, envs: Sequence[str] = DEFAULT) -> pd.DataFrame:
     """Steps per second, and their ratio to CartPole's, single and in a batch.
 
@@ -113,9 +136,15 @@ def table(rows: int, envs: Sequence[str] = DEFAULT) -> pd.DataFrame:
     """
     singles = rates({env: single_stepper(env, _SINGLE_STEPS) for env in (*envs, *REFERENCES)})
     batches = rates({env: batch_stepper(env, rows, _BATCH_STEPS) for env in (*envs, REFERENCE)}, _BATCH_ROUNDS)
+    return _lines([("single", singles), (f"batch of {rows}", batches)])
+
+
+def _lines(groups: Sequence[tuple[str, dict[str, float]]]) -> pd.DataFrame:
+    """Rates of groups that each were measured beside the reference."""
+    columns = ["faces", "env", "steps_per_s", "x_cartpole"]
     lines = [
-        {"faces": faces, "env": env, "steps_per_s": rate, "x_cartpole": rate / group[REFERENCE]}
-        for faces, group in (("single", singles), (f"batch of {rows}", batches))
+        dict(zip(columns, (faces, env, rate, rate / group[REFERENCE]), strict=True))
+        for faces, group in groups
         for env, rate in group.items()
     ]
-    return pd.DataFrame(lines)
+    return pd.DataFrame(lines, columns=columns)

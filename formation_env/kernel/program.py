@@ -9,8 +9,20 @@ from numpy.typing import NDArray
 
 from formation_env.files import hash_sources
 from formation_env.kernel import packing, settings, variants
-from formation_env.kernel.stages import kalman_filter, link, memory, noise, nonlinear_motion, observe, plan, reward
-from formation_env.kernel.stages import sensor, start, thruster, true_motion
+from formation_env.kernel.stages import (
+    kalman_filter,
+    link,
+    memory,
+    noise,
+    nonlinear_motion,
+    observe,
+    plan,
+    reward,
+    sensor,
+    start,
+    thruster,
+    true_motion,
+)
 from formation_env.kernel.stages.memory import Flags, Integers
 from formation_env.kernel.tile import MODELS
 from formation_env.numerics.arrays import Array, Array32
