@@ -52,6 +52,7 @@ INFO_SCALARS: Final[dict[str, Scalar]] = {
 INFO_VARIANT: Final = {"variant": Scalar("variant", int)}
 """Info key of scenarios with domain randomization."""
 _Float32Space = spaces.Space[NDArray[np.float32]]
+_FLOAT32: Final = np.dtype(np.float32)
 TOTALS: Final = "episode_totals"
 START_OPTION: Final = "initial_state"
 
@@ -198,7 +199,8 @@ def check_action(action: Any) -> NDArray[np.float32]:
     Raises:
         ValueError: wrong shape, no numbers, or not finite.
     """
-    array = _numbers(action, "action", np.float32)
+    is_ready = type(action) is np.ndarray and action.dtype is _FLOAT32  # as an action space samples it
+    array = action if is_ready else _numbers(action, "action", np.float32)
     if array.shape != (3,) or not isfinite(sum(array.tolist())):  # faster than numpy for three numbers
         raise ValueError(f"action: must be finite with shape (3,), got shape {array.shape}: {array}")
     return array
