@@ -12,7 +12,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices
 
 from agents.algorithms.shaping import Shaping
 from agents.policy.throttle import throttle
-from formation_env.envs import FormationVectorEnv, interface
+from formation_env.envs import FormationVectorEnv, info_keys
 from formation_env.task.loading import load_scenario
 from formation_env.task.scenario import Scenario
 
@@ -141,13 +141,13 @@ class Sb3VecEnv(VecEnv):
 
     def _last_info(self, infos: dict[str, Any], row: int) -> Row:
         """SB3's info of a row whose episode has ended."""
-        totals = infos["final_info"][interface.TOTALS]
+        totals = infos["final_info"][info_keys.TOTALS]
         totals = {name: float(values[row]) for name, values in totals.items() if not name.startswith("_")}
         age_s = round(time.perf_counter() - self._birth_s, 6)
         return {
             "terminal_observation": infos["final_obs"][row],
             "episode": {"r": totals["return"], "l": int(totals["steps"]), "t": age_s},
-            interface.TOTALS: totals,
+            info_keys.TOTALS: totals,
         }
 
     def close(self) -> None:

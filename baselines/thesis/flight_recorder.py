@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from baselines.design.guidance import GuidanceName, desired_states
 from baselines.thesis.recorded_flights import Flights
-from formation_env.envs import interface
+from formation_env.envs import info_keys
 from formation_env.numerics.arrays import Array
 from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import legs
@@ -61,7 +61,7 @@ class FlightRecorder:
     def add(self, infos: dict[str, Any], ended: NDArray[np.bool_] | None = None) -> None:
         """Add the next instant, with the rows that ended at it; rows whose episode ended before give NaN."""
         self._positions[self._filled] = infos["true_state"][:, :3] - self._path[self._step, :3]
-        self._thrusts[self._filled] = infos[interface.INFO_THRUST]
+        self._thrusts[self._filled] = infos[info_keys.THRUST]
         self._positions[self._filled, ~self._going] = self._thrusts[self._filled, ~self._going] = np.nan
         self._filled += 1
         if self._step == self._steps[self._place]:

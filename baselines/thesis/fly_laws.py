@@ -9,7 +9,7 @@ from baselines.design.guidance import GuidanceName
 from baselines.experiments.policy_batch import PolicyBatch
 from baselines.thesis.flight_recorder import MEASUREMENT, FlightRecorder, recorded_steps
 from baselines.thesis.recorded_flights import Flights
-from formation_env.envs import interface
+from formation_env.envs import info_keys, interface
 from formation_env.envs.vector import FormationVectorEnv
 from formation_env.evaluation.rollout import Policy
 from formation_env.numerics.arrays import Array
@@ -63,7 +63,7 @@ def _with_final_infos(infos: dict[str, Any]) -> dict[str, Any]:
     """Infos of a step; those of ended episodes replace those of the episodes that follow them."""
     finals, ended = infos["final_info"], infos["_final_info"]
     merged = dict(infos)
-    for name in ("true_state", "estimate", "measured", interface.INFO_THRUST, MEASUREMENT):
+    for name in ("true_state", "estimate", "measured", info_keys.THRUST, MEASUREMENT):
         if name in finals:
             mask = ended if finals[name].ndim == 1 else ended[:, None]
             merged[name] = np.where(mask, finals[name], infos[name])

@@ -7,53 +7,21 @@ import operator
 import reprlib
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
-from typing import Any, Final, NamedTuple, ParamSpec, cast
+from typing import Any, Final, ParamSpec, cast
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
-from formation_env.kernel.results import StepResults
 from formation_env.kernel.simulation import Simulation
 from formation_env.numerics.arrays import Array
 from formation_env.task import observation
-from formation_env.task.scenario import Scenario
 
 P = ParamSpec("P")
 
-INFO_STATES: Final = ("true_state", "estimate")
-"""Info keys that are results of the simulation by the same name."""
-INFO_THRUST: Final = "accel_m_s2"
-
-
-class Scalar(NamedTuple):
-    """An info of one number.
-
-    Attributes:
-        result: name of the simulation's result.
-        kind: its type.
-    """
-
-    result: str
-    kind: type
-
-
-INFO_SCALARS: Final[dict[str, Scalar]] = {
-    "position_error_m": Scalar("position_error", float),
-    "delta_v_m_s": Scalar("delta_v", float),
-    "error_cost_m_s": Scalar("error_cost", float),
-    "exit_cost_m_s": Scalar("exit_cost", float),
-    "nis": Scalar("nis", float),
-    "measured": Scalar("measured", bool),
-    "phase": Scalar("phase", int),
-}
-"""Info keys of one number each."""
-INFO_VARIANT: Final = {"variant": Scalar("variant", int)}
-"""Info key of scenarios with domain randomization."""
 _Float32Space = spaces.Space[NDArray[np.float32]]
 _FLOAT32: Final = np.dtype(np.float32)
-TOTALS: Final = "episode_totals"
 START_OPTION: Final = "initial_state"
 
 
@@ -65,38 +33,6 @@ def action_space() -> spaces.Space[NDArray[np.float32]]:
 def observation_space() -> spaces.Space[NDArray[np.float32]]:
     """See `formation_env.task.observation`."""
     return cast(_Float32Space, spaces.Box(-observation.BOUND, observation.BOUND, (observation.SIZE,), np.float32))
-
-
-def info_scalars(scenario: Scenario) -> dict[str, Scalar]:
-    """Info keys of one number each that a scenario's environments give."""
-    return INFO_SCALARS if scenario.domain_randomization is None else INFO_SCALARS | INFO_VARIANT
-
-
-def infos_of(results: StepResults, scenario: Scenario, analysis: bool) -> dict[str, NDArray[Any]]:
-    """Infos of a step or a reset, each (rows,) or (rows, size): views of its results.
-
-    Args:
-        results: of the step or the reset.
-        scenario: the scenario.
-        analysis: whether the step's noises are among them, see `FormationEnv`.
-    """
-    infos = {name: results[name] for name in INFO_STATES}
-    infos[INFO_THRUST] = results["thrust"]
-    infos |= {name: results[result] for name, (result, _) in info_scalars(scenario).items()}
-    if analysis:
-        measured = 3 if scenario.sensor.measures == "position" else 6
-        infos |= {name: results[name][:, :measured] for name in ("measurement", "innovation")}
-        infos |= {"process_noise_m_s2": results["process_noise"], "thrust_noise": results["thrust_noise"]}
-    return infos
-
-
-def with_masks(infos: dict[str, Any], mask: NDArray[np.bool_]) -> dict[str, Any]:
-    """Infos, and the rows that have them by the same name with an underscore, as Gymnasium wants it; one array."""
-    with_masks = {}
-    for name, value in infos.items():
-        with_masks[name] = value
-        with_masks[f"_{name}"] = mask
-    return with_masks
 
 
 def with_length(spec: EnvSpec | None, max_episode_steps: int) -> EnvSpec | None:

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
-from formation_env.envs import interface
+from formation_env.envs import info_keys, interface
 from formation_env.kernel.metrics import episode_metrics
 from formation_env.kernel.simulation import Simulation
 from formation_env.kernel.tile import FLAGS, INTEGERS, RESULTS
@@ -115,9 +115,8 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if self._trail is not None:
             self._trail.clear()
             self._show()
-        results = self.simulation.results
-        values = results.values[:, 0]
-        return observations[0], self._info(values, values.tolist(), results.flags.tolist())
+        block, flags, _, _ = self.simulation.results.blocks
+        return observations[0], self._info(block[:, 0], block[:, 0].tolist(), flags.tolist())
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Fly one step.
@@ -136,13 +135,13 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         simulation.actions[0] = action
         observations = simulation.new_observations()
         simulation.step(observations)
-        results = simulation.results
-        values, flags = results.values[:, 0], results.flags.tolist()
+        block, flag_block, _, _ = simulation.results.blocks
+        values, flags = block[:, 0], flag_block.tolist()
         numbers = values.tolist()
         info = self._info(values, numbers, flags)
         terminated, truncated = flags[_TERMINATED][0], flags[_TRUNCATED][0]
         if terminated or truncated:
-            info[interface.TOTALS] = {name: float(value[0]) for name, value in episode_metrics(simulation).items()}
+            info[info_keys.TOTALS] = {name: float(value[0]) for name, value in episode_metrics(simulation).items()}
         if self._trail is not None:
             self._show()
         return observations[0], numbers[_REWARD], terminated, truncated, info
@@ -155,7 +154,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             numbers: the same as Python numbers.
             flags: its flags, a list of one each.
         """
-        results = self.simulation.results
+        integers = self.simulation.results.blocks[2]
         error_m, delta_v, error_cost, exit_cost, nis = numbers[_NUMBERS]
         info: dict[str, Any] = {
             "true_state": values[_TRUE_STATE],
@@ -167,13 +166,13 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "exit_cost_m_s": exit_cost,
             "nis": nis,
             "measured": flags[_MEASURED][0],
-            "phase": results.integers.item(_PHASE),
+            "phase": integers.item(_PHASE),
         }
         if self._varied:
-            info["variant"] = results.integers.item(_VARIANT)
+            info["variant"] = integers.item(_VARIANT)
         if self._analysis:
-            every = interface.infos_of(results, self.scenario, True)
-            info |= {name: every[name][0] for name in every if name not in info}
+            for name, _, block, place in info_keys.keys_of(self.scenario, analysis=True)[len(info) :]:
+                info[name] = self.simulation.results.blocks[block][place, 0]
         return info
 
     def _show(self) -> None:

@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from formation_env.envs import interface
+from formation_env.envs import info_keys, interface
 from formation_env.kernel.metrics import METRICS, episode_metrics
 from formation_env.kernel.results import StepResults
 from formation_env.kernel.simulation import Simulation
@@ -76,7 +76,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.simulation = Simulation(self.scenario, num_envs, with_noises=analysis)
-        self._analysis = analysis
+        self._info_keys = info_keys.keys_of(self.scenario, analysis)
         self._keyed = False
         self._waiting = np.empty(0, np.intp)  # rows that ended and are not reset yet
 
@@ -168,9 +168,9 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         finals = self._end(observations, ended, complete) if len(ended) else {}
         if self.autoreset_mode is not AutoresetMode.SAME_STEP:
             self._waiting = ended
-        infos = self._infos()
-        infos.update(finals)
-        return observations, rewards, terminations, truncations, infos
+        shown = self._infos()
+        shown.update(finals)
+        return observations, rewards, terminations, truncations, shown
 
     def _check_ready(self) -> None:
         """Refuse a step that needs a reset before it."""
@@ -194,8 +194,8 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         columns = np.zeros((len(METRICS), self.num_envs))
         columns[:, rows] = list(episode_metrics(self.simulation, rows).values())
         mask = self._mask(rows)
-        totals = interface.with_masks(dict(zip(METRICS, columns, strict=True)), mask)
-        return {interface.TOTALS: totals, f"_{interface.TOTALS}": mask.copy()}
+        totals = info_keys.with_mask(dict(zip(METRICS, columns, strict=True)), mask)
+        return {info_keys.TOTALS: totals, f"_{info_keys.TOTALS}": mask.copy()}
 
     def _begin_next(
         self, observations: Observations, ended: NDArray[np.intp], totals: dict[str, Any]
@@ -214,7 +214,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         results: StepResults = self.simulation.results
         mask = np.ones(self.num_envs, bool) if rows is None else self._mask(rows)
         shown = results if rows is None else results.only(rows)
-        return interface.with_masks(interface.infos_of(shown, self.scenario, self._analysis), mask)
+        return info_keys.batched(self._info_keys, shown, mask)
 
     def _mask(self, rows: NDArray[np.intp]) -> Flags:
         """Which rows are among some (num_envs,)."""

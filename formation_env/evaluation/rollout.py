@@ -7,7 +7,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 import pandas as pd
 
-from formation_env.envs import interface
+from formation_env.envs import info_keys
 from formation_env.envs.vector import FormationVectorEnv
 from formation_env.kernel.metrics import METRICS
 from formation_env.task.loading import load_scenario
@@ -72,7 +72,7 @@ def _fly(policy: Policy, scenario: Scenario, seeds: list[int], progress: Callabl
         closing = starts & open_rows
         if closing.any():
             for name, values in table.items():
-                values[closing] = infos["final_info"][interface.TOTALS][name][closing]
+                values[closing] = infos["final_info"][info_keys.TOTALS][name][closing]
             open_rows &= ~closing
         progress(len(seeds))
     return pd.DataFrame({"seed": seeds, **table})
@@ -109,5 +109,5 @@ def _instant(infos: dict[str, Any]) -> dict[str, float]:
     """The first row's infos as a line."""
     line = dict(zip(_STATE_COLUMNS, infos["true_state"][0], strict=True))
     line |= {f"{name}_estimate": x for name, x in zip(_STATE_COLUMNS, infos["estimate"][0], strict=True)}
-    line |= dict(zip(("ax_m_s2", "ay_m_s2", "az_m_s2"), infos[interface.INFO_THRUST][0], strict=True))
+    line |= dict(zip(("ax_m_s2", "ay_m_s2", "az_m_s2"), infos[info_keys.THRUST][0], strict=True))
     return line | {name: infos[name][0] for name in ("position_error_m", "delta_v_m_s", "measured", "phase")}

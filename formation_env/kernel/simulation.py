@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 from formation_env.kernel import settings
 from formation_env.kernel.packing import pack_variants
 from formation_env.kernel.program import kinds_of, program
-from formation_env.kernel.results import NO_NOISES, RESULT_NAMES, StepResults
+from formation_env.kernel.results import RESULT_NAMES, StepResults, block_shapes
+from formation_env.kernel.reused_arrays import ReusedArrays
 from formation_env.kernel.stages.noise import STREAM_SIZE
-from formation_env.kernel.tile import FLAGS, RESULTS, STATE, STATE_SIZE, TOTALS, WORK32_SIZE, WORK_SIZE, State
+from formation_env.kernel.tile import STATE, STATE_SIZE, TOTALS, WORK32_SIZE, WORK_SIZE, State
 from formation_env.numerics.arrays import Array, Array32
 from formation_env.numerics.jit import LANES
 from formation_env.numerics.random_streams import stream_key
@@ -55,9 +56,10 @@ class Simulation:
         self.variants = draw_variants(scenario)
         self.schedule, self._seen, self._settings = pack_variants(self.variants)
         self.actions = np.zeros((num_rows, 3), np.float32)
-        self.results = StepResults.zeros(num_rows, with_noises)
         self._with_noises = with_noises
-        self._shapes = tuple(block.shape for block in self.results.blocks)
+        self._blocks = ReusedArrays(block_shapes(num_rows, with_noises))
+        self._observations = ReusedArrays([((num_rows, observation.SIZE), np.float32)])
+        self.results = StepResults.zeros(num_rows, with_noises)
         self._states = np.zeros((tiles, STATE_SIZE))
         self._streams = np.zeros((tiles, STREAM_SIZE), np.uint32)
         self._keys = np.zeros((num_rows, 3), np.uint64)
@@ -112,33 +114,22 @@ class Simulation:
         Returns:
             How many episodes ended.
         """
-        self.results = results = self._new_results()
-        ended: int = program(self._kinds).step(
-            *self._arrays, self.actions, observations, results.values, results.flags, results.integers, results.noises
-        )
+        del self.results  # so that its blocks are written again if nobody else holds them
+        self.results = StepResults(self._blocks.take(), self.num_rows)
+        ended: int = program(self._kinds).step(*self._arrays, self.actions, observations, *self.results.blocks)
         return ended
-
-    def _new_results(self) -> StepResults:
-        """Uninitialised blocks."""
-        values, flags, integers, noises = self._shapes
-        return StepResults(
-            np.empty(values),
-            np.empty(flags, np.bool_),
-            np.empty(integers, np.int64),
-            np.empty(noises) if self._with_noises else NO_NOISES,
-            self.num_rows,
-        )
 
     def forget_ends(self, rows: NDArray[np.intp]) -> None:
         """Let rows that only began in this step have neither reward nor end."""
-        self.results.values[RESULTS.reward, rows] = 0.0
-        self.results.flags[FLAGS.terminated :, rows] = False
+        self.results["reward"][rows] = 0.0
+        self.results["terminated"][rows] = self.results["truncated"][rows] = False
 
     def new_results(self, rows: NDArray[np.intp]) -> None:
         """Let a reset of some rows write into blocks of its own."""
-        whole = len(rows) == self.num_rows
-        zero = StepResults.zeros(self.num_rows, self._with_noises)
-        self.results = zero if whole else self.results.copy()
+        if len(rows) < self.num_rows:
+            self.results = self.results.copy()
+        else:
+            self.results = StepResults.zeros(self.num_rows, self._with_noises)
 
     def memory(self) -> Array:
         """Copy of the rows' state, random streams included, for `recall`: numbers (k,) of any meaning."""
@@ -159,7 +150,7 @@ class Simulation:
 
     def new_observations(self) -> NDArray[np.float32]:
         """Uninitialised array (num_rows, SIZE) for the observations of all rows."""
-        return np.empty((self.num_rows, observation.SIZE), np.float32)
+        return self._observations.take()[0]
 
     def read(self, name: str, rows: Rows = ALL_ROWS, dtype: type = float) -> NDArray[Any]:
         """Copy of a named quantity of some rows.

@@ -26,9 +26,10 @@ def ideal(work: Array, work32: Array32, i: int, action: tuple[float, float, floa
 @tile_function
 def thrust_ideal(actions: Array32, first: int, work: Array, work32: Array32, settings: Array, n: int) -> None:
     """Turn the actions (rows, 3) from row `first` on into accelerations."""
-    own = actions[first:]  # so that the compiler sees that no index is negative
+    # Flat and from the first on, so that the compiler knows the stride and sees that no index is negative.
+    own = actions.reshape(-1)[3 * first :]
     for i in range(min(n, LANES)):
-        action = float(own[i, 0]), float(own[i, 1]), float(own[i, 2])
+        action = float(own[3 * i]), float(own[3 * i + 1]), float(own[3 * i + 2])
         ideal(work, work32, i, action, scalars(settings, i))
 
 
