@@ -16,6 +16,7 @@ from formation_env.envs import info_keys, interface
 from formation_env.kernel.metrics import METRICS, episode_metrics
 from formation_env.kernel.results import StepResults
 from formation_env.kernel.simulation import Simulation
+from formation_env.kernel.threads import check_num_threads
 from formation_env.task.loading import load_scenario
 from formation_env.task.scenario import Scenario
 
@@ -46,6 +47,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
         max_episode_steps: int | None = None,
         analysis: bool = False,
+        num_threads: int | None = None,
     ) -> None:
         """Make the environment.
 
@@ -57,10 +59,12 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             max_episode_steps: truncate episodes after this many steps, if the plan is longer, as Gymnasium's
                 `TimeLimit` does for a single environment; such episodes have no `episode_totals`.
             analysis: as of `FormationEnv`.
+            num_threads: threads that share a step, with the same results bit for bit; None: a number that suits the
+                rows and the CPUs.
 
         Raises:
             ConfigError: the scenario is wrong.
-            ValueError: no rows, a render mode, an unknown autoreset mode or no steps.
+            ValueError: no rows, a render mode, an unknown autoreset mode, no steps or no threads.
         """
         _check_arguments(num_envs, render_mode, max_episode_steps)
         self.autoreset_mode = _autoreset_mode(autoreset_mode)
@@ -75,7 +79,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self.single_observation_space = interface.observation_space()
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.simulation = Simulation(self.scenario, num_envs, with_noises=analysis)
+        self.simulation = Simulation(self.scenario, num_envs, analysis, check_num_threads(num_threads, num_envs))
         self._info_keys = info_keys.keys_of(self.scenario, analysis)
         self._keyed = False
         self._waiting = np.empty(0, np.intp)  # rows that ended and are not reset yet

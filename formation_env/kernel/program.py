@@ -71,7 +71,8 @@ class Program(NamedTuple):
         results, flags, integers, noises: blocks (fields, rows), written; no fields of `noises` if nobody asks.
 
     Attributes:
-        step: fly all rows over one step, under actions (rows, 3); returns how many episodes ended.
+        step: fly the rows of the tiles from first to last - 1 over one step, under actions (rows, 3); returns how many
+            episodes ended. Threads may step different tiles at once, each with scratch space of its own.
         reset: start the next episode of the rows `rows` (k,), side by side in a spare tile, from `starts`: states
             (k, 6) to start at exactly if `given`, else each variant's nominal start (variants, 6).
         look: write the observations of all rows again.
@@ -119,6 +120,8 @@ def _step(kinds: Kinds, sources: str) -> Any:
         schedule: Array,
         seen: Array32,
         packed: Array,
+        first: int,
+        last: int,
         actions: Array32,
         observations: Array32,
         results: Array,
@@ -128,7 +131,7 @@ def _step(kinds: Kinds, sources: str) -> Any:
     ) -> int:
         """Fly rows over one step; the arguments are those of `Program`."""
         ended, known_line = 0, -1
-        for index in range(len(states)):
+        for index in range(first, last):
             state, row = states[index], index * LANES
             n = min(LANES, len(actions) - row)
             plan.advance(state, n)

@@ -1,5 +1,7 @@
 """Rows of episodes of one scenario: the arrays of the compiled program, and their values by name."""
 
+from functools import partial
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -11,6 +13,7 @@ from formation_env.kernel.program import kinds_of, program
 from formation_env.kernel.results import RESULT_NAMES, StepResults, block_shapes
 from formation_env.kernel.reused_arrays import ReusedArrays
 from formation_env.kernel.stages.noise import STREAM_SIZE
+from formation_env.kernel.threads import run_parts
 from formation_env.kernel.tile import STATE, STATE_SIZE, TOTALS, WORK32_SIZE, WORK_SIZE, State
 from formation_env.numerics.arrays import Array, Array32
 from formation_env.numerics.jit import LANES
@@ -42,13 +45,14 @@ class Simulation:
         results: of the last step or reset; blocks of its own, so a later step does not change them.
     """
 
-    def __init__(self, scenario: Scenario, num_rows: int, with_noises: bool = False) -> None:
+    def __init__(self, scenario: Scenario, num_rows: int, with_noises: bool = False, num_threads: int = 1) -> None:
         """Make the rows; they have no streams before `seed`.
 
         Args:
             scenario: the scenario.
             num_rows: rows.
             with_noises: whether results hold the step's noises, see `tile.Noises`.
+            num_threads: threads that share a step; results are the same bits for any number.
         """
         tiles = -(-num_rows // LANES)
         self.scenario = scenario
@@ -65,7 +69,11 @@ class Simulation:
         self._keys = np.zeros((num_rows, 3), np.uint64)
         self._scratch = self._new_scratch()
         self._spare = np.zeros(STATE_SIZE), np.zeros(STREAM_SIZE, np.uint32)
-        self._arrays = (self._states, self._streams, *self._scratch, self.schedule, self._seen, self._settings)
+        num_parts = min(num_threads, tiles)
+        ends = [tiles * part // num_parts for part in range(num_parts + 1)]
+        self._parts = [self._new_part(*span) for span in pairwise(ends)]
+        self._first_part, *others = self._parts
+        self._is_split = bool(others)
         self._kinds = kinds_of(scenario, len(self.variants))
         self.plan_limits = np.array([(each.num_steps, each.limits.max_distance_m) for each in self.variants])
         self._nominal_starts = np.array([each.start.formation.state(each.orbit) for each in self.variants])
@@ -75,6 +83,11 @@ class Simulation:
         width = WORK_SIZE + (self.schedule.shape[2] - WIDTH) * LANES
         own = settings.SIZE * LANES if len(self.variants) > 1 else 0
         return np.zeros(width), np.zeros(WORK32_SIZE, np.float32), np.zeros(own)
+
+    def _new_part(self, first: int, last: int) -> tuple[Any, ...]:
+        """First arguments of the compiled step for the tiles from first to last - 1, with their scratch space."""
+        scratch = self._new_scratch() if first else self._scratch
+        return (self._states, self._streams, *scratch, self.schedule, self._seen, self._settings, first, last)
 
     def seed(self, row: int, generator: np.random.Generator) -> None:
         """Give a row a new random stream; its next episode is the stream's first."""
@@ -116,7 +129,15 @@ class Simulation:
         """
         del self.results  # so that its blocks are written again if nobody else holds them
         self.results = StepResults(self._blocks.take(), self.num_rows)
-        ended: int = program(self._kinds).step(*self._arrays, self.actions, observations, *self.results.blocks)
+        if self._is_split:
+            return run_parts(partial(self._step_part, observations), len(self._parts))
+        ended: int = program(self._kinds).step(*self._first_part, self.actions, observations, *self.results.blocks)
+        return ended
+
+    def _step_part(self, observations: Array32, part: int) -> int:
+        """Fly the rows of a part; returns how many of its episodes ended."""
+        step = program(self._kinds).step
+        ended: int = step(*self._parts[part], self.actions, observations, *self.results.blocks)
         return ended
 
     def forget_ends(self, rows: NDArray[np.intp]) -> None:
