@@ -2,21 +2,32 @@
 
 import importlib.metadata
 import warnings
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Final
 
 import typer
 
+from formation_env import cli_bench
 from formation_env.cli_errors import DISTRIBUTION, WRONG_INPUT
 from formation_env.cli_group import Group, make_app
-from formation_env.cli_options import Env, Envs, Seed
+from formation_env.cli_options import Env, Seed
 
 if TYPE_CHECKING:
     from formation_env.evaluation.rollout import Policy
     from formation_env.task.scenario import Scenario
 
-COMMANDS: Final = ("list", "show", "kinds", "schema", "validate", "show-observation", "render", "bench")
+COMMANDS: Final = (
+    "list",
+    "show",
+    "kinds",
+    "schema",
+    "validate",
+    "show-observation",
+    "render",
+    "bench",
+    "compile",
+    "soak",
+)
 FORMER_COMMANDS: Final = {
     "scenarios": f"{DISTRIBUTION} env list",
     "check": f"{DISTRIBUTION} env validate",
@@ -189,25 +200,6 @@ def _make_policy(name: str | None, scenario: "Scenario") -> "Policy | None":
     return made
 
 
-@app.command(epilog=f"Example: {DISTRIBUTION} env bench keeping --rows 1024")
-def bench(
-    envs: Envs = None,
-    rows: Annotated[int, typer.Option(min=1, max=1_000_000, help="Rows of the batched environment.")] = 4096,
-    rivals: Annotated[bool, typer.Option("--rivals", help="Also those of other packages that are installed.")] = False,
-) -> None:
-    """Measure environment steps per second, next to Gymnasium's own environments in the same run."""
-    from formation_env.evaluation import bench as benchmark
-    from formation_env.task.loading import load_scenario
-
-    chosen: Sequence[str] = envs or benchmark.DEFAULT
-    for env in chosen:
-        load_scenario(env)
-    for name, seconds in benchmark.startup().items():
-        typer.echo(f"{name:20s} {seconds:6.2f} s")
-    formats = {"steps_per_s": "{:,.0f}".format, "x_cartpole": "{:.3f}".format}
-    typer.echo(benchmark.table(rows, chosen).to_string(index=False, formatters=formats))
-    if rivals:
-        others, left_out = benchmark.beside_rivals(chosen[0])
-        typer.echo("\n".join(left_out))
-        if len(others):
-            typer.echo(others.to_string(index=False, formatters=formats))
+app.command(epilog=f"Example: {DISTRIBUTION} env bench keeping --rows 1024 --plot keeping.png")(cli_bench.bench)
+app.command("compile", epilog=f"Example: {DISTRIBUTION} env compile keeping")(cli_bench.compile_programs)
+app.command(epilog=f"Example: {DISTRIBUTION} env soak keeping --steps 1e8")(cli_bench.soak)

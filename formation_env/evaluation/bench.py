@@ -62,7 +62,7 @@ def batch_stepper(env: str, rows: int, steps: int) -> Callable[[], int]:
     made = gymnasium.make_vec(env_id, rows, vectorization_mode="vector_entry_point", **arguments)
     made.reset(seed=0)
     made.action_space.seed(0)
-    actions = itertools.cycle([made.action_space.sample() for _ in range(_ACTIONS)])
+    actions = itertools.cycle([made.action_space.sample() for _ in range(min(_ACTIONS, steps))])
 
     def run() -> int:
         for action in itertools.islice(actions, steps):

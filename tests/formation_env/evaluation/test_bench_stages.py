@@ -1,0 +1,38 @@
+"""The times of the stages: which there are, and that nothing is changed by repeating them."""
+
+import inspect
+import re
+
+import numpy as np
+
+from formation_env.evaluation import bench_stages
+from formation_env.kernel import program
+from formation_env.task.loading import load_scenario
+
+
+def test_stages_are_those_of_the_step_in_its_order() -> None:
+    """A stage that is added to the program, or moves in it, must be timed there; noises are for those who ask."""
+    source = inspect.getsource(program._step).partition('"""Fly rows')[2]
+    calls = re.findall(r"^ +(?:\w+ \+?= )?(?:\w+\.)?(\w+)\((?:state|streams|actions|work\d*)\b", source, re.MULTILINE)
+    steps = [name for name in calls if name not in ("innovate", "write_noises")]
+    kinds = program.kinds_of(load_scenario("keeping_randomized"), 2)
+    chosen = {
+        "thrust": "thrust_ideal",
+        "move": "fly_constant",
+        "predict": "predict_constant",
+        "sense": "sense_position_and_velocity",
+        "measure": "measure_position_and_velocity",
+    }
+    assert len(steps) == 16
+    timed = [name.rpartition(".")[2] for name in bench_stages._calls(kinds)]
+    assert timed == [chosen.get(name, name) for name in steps]
+
+
+def test_times_are_finite_and_the_state_is_restored() -> None:
+    """Every stage is called in a batch whose last tile is not full; the whole step takes some time."""
+    times = bench_stages.stage_times(load_scenario("keeping"), rows=65, rounds=1)
+    assert list(times.columns) == ["stage", "ns_per_row"]
+    assert times["stage"].iloc[-1] == bench_stages.WHOLE
+    assert np.isfinite(times["ns_per_row"]).all()
+    assert (times["ns_per_row"] >= 0).all()
+    assert times["ns_per_row"].iloc[-1] > 0

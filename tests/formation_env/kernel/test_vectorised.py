@@ -1,0 +1,162 @@
+"""The stages run as vector instructions: LLVM itself tells which loops it vectorised.
+
+This file, run as a program, compiles every stage and lets LLVM write its remarks to stderr; the tests read them.
+"""
+
+import inspect
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Final
+
+import llvmlite.binding as llvm
+import numba
+import pytest
+from numba import types
+
+from formation_env.kernel.stages import (
+    kalman_filter,
+    link,
+    memory,
+    noise,
+    nonlinear_motion,
+    observe,
+    plan,
+    reward,
+    sensor,
+    start,
+    thruster,
+    true_motion,
+)
+
+INT, BOOL = types.intp, types.boolean
+FIELDS, FIELDS32, STREAM = types.float64[::1], types.float32[::1], types.uint32[::1]
+TABLE, TABLE32 = types.float64[:, ::1], types.float32[:, ::1]
+FLAGS, INTEGERS = types.boolean[:, ::1], types.int64[:, ::1]
+PLANS, VIEWS = types.float64[:, :, ::1], types.float32[:, :, ::1]
+
+MOTION: Final = (FIELDS, FIELDS, TABLE, INT, INT)
+FILTER: Final = (FIELDS, FIELDS, TABLE, INT)
+SENSE: Final = (FIELDS, FIELDS, FIELDS32, TABLE, INT)
+STAGES: Final = {
+    plan.advance: ((FIELDS, INT), 1),
+    plan.broadcast_line: ((FIELDS, INT, INT, FIELDS, INT, INT), 1),
+    plan.read_plan: ((FIELDS, FIELDS, FIELDS32, PLANS, VIEWS, INT, INT), 14),
+    noise.draw: ((STREAM, FIELDS32, INT), 2),
+    thruster.thrust_ideal: ((TABLE32, INT, FIELDS, FIELDS32, TABLE, INT), 1),
+    link.change: ((FIELDS, FIELDS32, TABLE, INT), 1),
+    link.receive: (FILTER, 1),
+    true_motion.push: ((FIELDS, FIELDS32, TABLE, INT), 3),
+    true_motion.fly_constant: (MOTION, 1),
+    true_motion.fly_varying: (MOTION, 1),
+    nonlinear_motion.fly_near: (MOTION, 25),
+    nonlinear_motion.fly_far: (MOTION, 7),
+    kalman_filter.predict_constant: (FILTER, 2),
+    kalman_filter.predict_varying: (FILTER, 2),
+    sensor.sense_position: (SENSE, 3),
+    sensor.sense_position_and_velocity: (SENSE, 3),
+    kalman_filter.innovate: ((FIELDS, FIELDS, INT), 6),
+    kalman_filter.measure_position: (FILTER, 1),
+    kalman_filter.measure_position_and_velocity: (FILTER, 1),
+    reward.score: ((FIELDS, FIELDS, TABLE, INT), 2),
+    observe.observe: ((FIELDS, FIELDS, FIELDS32, INT), 13),
+    start.begin: ((FIELDS, FIELDS32, BOOL, TABLE, INT), 13),
+    memory.write_results: ((FIELDS, FIELDS, TABLE, FLAGS, INTEGERS, INT, INT), 27),
+}
+"""Each stage that loops over the rows of a tile: its signature, and how many of its loops are vectorised with AVX2.
+
+A stage is compiled with the functions that it calls and that no stage above it calls. LLVM unrolls most loops over
+fields first, so the loop over rows inside counts once for each field.
+"""
+OVER_ROWS: Final = "range(min(n, LANES))"
+MODULES: Final = (
+    kalman_filter,
+    link,
+    memory,
+    noise,
+    nonlinear_motion,
+    observe,
+    plan,
+    reward,
+    sensor,
+    start,
+    thruster,
+    true_motion,
+)
+
+
+def probe(numbers: Any) -> None:
+    """A loop that every compiler of a processor with vectors turns into vector instructions."""
+    for i in range(len(numbers)):
+        numbers[i] += 1.0
+
+
+def compile_stages() -> None:
+    """Compile the probe and the stages; LLVM's remarks follow each name on stderr."""
+    llvm.set_option("", "--pass-remarks=loop-vectorize")
+    functions = {numba.njit(error_model="numpy")(probe): (FIELDS,)} | {each: own for each, (own, _) in STAGES.items()}
+    for function, signature in functions.items():
+        print(f"stage: {name_of(function)}", file=sys.stderr, flush=True)
+        function.compile(signature)
+
+
+def name_of(function: Any) -> str:
+    """Name of a compiled function behind that of its module."""
+    return f"{function.py_func.__module__.rpartition('.')[2]}.{function.py_func.__name__}"
+
+
+@pytest.fixture(scope="module")
+def widths() -> dict[str, list[int]]:
+    """Rows that each vectorised loop of a stage takes at once."""
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    command = [sys.executable, __file__]
+    found = subprocess.run(command, env=environment, capture_output=True, text=True, check=True, timeout=300)
+    parts = re.split(r"^stage: (\S+)$", found.stderr, flags=re.MULTILINE)[1:]
+    remarks = {
+        name: [int(width) for width in re.findall(r"vectorized loop \(vectorization width: (\d+)", text)]
+        for name, text in zip(parts[::2], parts[1::2], strict=True)
+    }
+    if not remarks.pop(next(iter(remarks))):
+        pytest.skip("LLVM gives no remarks here, or this processor has no vectors")
+    return remarks
+
+
+def has_avx2() -> bool:
+    """Whether numba compiles for AVX2, that is four float64 at once."""
+    target: Any = numba.core.registry.cpu_target.target_context.codegen()
+    return "+avx2" in str(target._get_host_cpu_features()).split(",")
+
+
+def test_every_stage_is_vectorised(widths: dict[str, list[int]]) -> None:
+    """A loop that became scalar is missing: its rows take two to eight times as long, with the same results."""
+    width = 4 if has_avx2() else 2
+    scalar = {}
+    for stage, (_, loops) in STAGES.items():
+        vectorised = sum(each >= width for each in widths[name_of(stage)])
+        if vectorised < (loops if has_avx2() else 1):  # without AVX2 some small loops are not worth it to LLVM
+            scalar[name_of(stage)] = f"{vectorised} of {loops} loops"
+    assert scalar == {}
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.rpartition(".")[2])
+def test_no_stage_is_left_out(module: ModuleType) -> None:
+    """Every public function that loops over a tile's rows is in the table above; private ones are compiled with it."""
+    looping = [
+        name
+        for name, function in vars(module).items()
+        if loops_over_rows(function) and function.__module__ == module.__name__ and not name.startswith("_")
+    ]
+    assert set(looping) <= {stage.py_func.__name__ for stage in STAGES}
+
+
+def loops_over_rows(function: Callable[..., Any]) -> bool:
+    """Whether this is a compiled function with a loop over the rows of a tile."""
+    return hasattr(function, "py_func") and OVER_ROWS in inspect.getsource(function.py_func)
+
+
+if __name__ == "__main__":
+    compile_stages()
