@@ -67,13 +67,16 @@ def _print_rates(rates: "pd.DataFrame") -> None:
 
 def _print_row(env: str, rows: int, max_rows: int, plot: Path | None) -> None:
     """Print time by stage, memory, and time against rows of an environment, and plot the last."""
+    import pandas as pd
+
     from formation_env.evaluation.bench_rows import ROWS, bytes_per_row, plot_time_per_row, time_per_row
-    from formation_env.evaluation.bench_stages import stage_times
+    from formation_env.kernel.stage_times import stage_times
     from formation_env.task.loading import load_scenario
 
     scenario = load_scenario(env)
     typer.echo(f"\n{env}, {rows} rows")
-    typer.echo(stage_times(scenario, rows).to_string(index=False, float_format="{:.2f}".format))
+    stages = pd.DataFrame(stage_times(scenario, rows).items(), columns=["stage", "ns_per_row"])
+    typer.echo(stages.to_string(index=False, float_format="{:.2f}".format))
     typer.echo("\n" + bytes_per_row(scenario, rows).to_string(index=False, float_format="{:.1f}".format))
     times = time_per_row(env, [each for each in ROWS if each <= max_rows])
     typer.echo("\n" + times.to_string(index=False, float_format="{:,.1f}".format))

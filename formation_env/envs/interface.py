@@ -151,7 +151,7 @@ def check_actions(actions: Any, num_rows: int) -> NDArray[np.float32]:
     array = _numbers(actions, "actions", np.float32)
     if array.shape != (num_rows, 3):
         raise ValueError(f"actions: shape must be ({num_rows}, 3), got {array.shape}")
-    if not np.isfinite(array).all():
+    if np.count_nonzero(np.isfinite(array)) < array.size:  # faster than `all`
         row = int(np.argmin(np.isfinite(array).all(axis=1)))
         raise ValueError(f"actions: row {row} must be finite, got {array[row]}")
     return array

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from formation_env.envs import info_keys, interface
 from formation_env.kernel.metrics import episode_metrics
 from formation_env.kernel.simulation import Simulation
-from formation_env.kernel.tile import FLAGS, INTEGERS, RESULTS
-from formation_env.numerics.arrays import Array
+from formation_env.kernel.tile import INTEGERS, RESULTS
 from formation_env.rendering.modes import FRAMES_PER_S, RENDER_MODES
 from formation_env.task.loading import load_scenario
 from formation_env.task.scenario import Scenario
@@ -25,9 +24,7 @@ _ONLY_ROW = np.zeros(1, np.intp)
 _TRUE_STATE = slice(RESULTS.true_state, RESULTS.true_state + 6)
 _ESTIMATE = slice(RESULTS.estimate, RESULTS.estimate + 6)
 _THRUST = slice(RESULTS.thrust, RESULTS.thrust + 3)
-_NUMBERS = slice(RESULTS.position_error, RESULTS.reward)
-_REWARD = RESULTS.reward
-_MEASURED, _TERMINATED, _TRUNCATED = FLAGS
+_NUMBERS = slice(RESULTS.position_error, RESULTS.reward + 1)
 _PHASE, _VARIANT = INTEGERS
 
 
@@ -67,6 +64,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.action_space = interface.action_space()
         self.observation_space = interface.observation_space()
         self.simulation = Simulation(self.scenario, 1, with_noises=analysis)
+        self._observations = self.simulation.new_observations()
         self._analysis = analysis
         self._varied = self.scenario.domain_randomization is not None
         self._keyed = False
@@ -107,16 +105,15 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if seed is not None or not self._keyed:
             self.simulation.seed(0, self.np_random)
             self._keyed = True
-        observations = self.simulation.new_observations()
-        self.simulation.new_results(_ONLY_ROW)
-        self.simulation.reset(_ONLY_ROW, observations, starts)
+        self.simulation.reset(_ONLY_ROW, self._observations, starts)
+        self.simulation.forget_ends(_ONLY_ROW)
         if self._renderer is not None:
             self._renderer.restart()
         if self._trail is not None:
             self._trail.clear()
             self._show()
-        block, flags, _, _ = self.simulation.results.blocks
-        return observations[0], self._info(block[:, 0], block[:, 0].tolist(), flags.tolist())
+        info, _, _, _ = self._read_results()
+        return self._observations[0].copy(), info
 
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Fly one step.
@@ -133,29 +130,20 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise gymnasium.error.ResetNeeded("step: call reset first")
         simulation = self.simulation
         simulation.actions[0] = action
-        observations = simulation.new_observations()
-        simulation.step(observations)
-        block, flag_block, _, _ = simulation.results.blocks
-        values, flags = block[:, 0], flag_block.tolist()
-        numbers = values.tolist()
-        info = self._info(values, numbers, flags)
-        terminated, truncated = flags[_TERMINATED][0], flags[_TRUNCATED][0]
+        simulation.step_in_place(self._observations)
+        info, reward, terminated, truncated = self._read_results()
         if terminated or truncated:
             info[info_keys.TOTALS] = {name: float(value[0]) for name, value in episode_metrics(simulation).items()}
         if self._trail is not None:
             self._show()
-        return observations[0], numbers[_REWARD], terminated, truncated, info
+        return self._observations[0].copy(), reward, terminated, truncated, info
 
-    def _info(self, values: Array, numbers: list[float], flags: list[list[bool]]) -> dict[str, Any]:
-        """Info of the last step or reset: the vectors are views of its results.
-
-        Args:
-            values: results (NUM_RESULTS,).
-            numbers: the same as Python numbers.
-            flags: its flags, a list of one each.
-        """
-        integers = self.simulation.results.blocks[2]
-        error_m, delta_v, error_cost, exit_cost, nis = numbers[_NUMBERS]
+    def _read_results(self) -> tuple[dict[str, Any], float, bool, bool]:
+        """Info, reward and ends of the last step or reset; the info's vectors are views of a copy of its results."""
+        block, flags, integers, _ = self.simulation.results.blocks
+        values = block.ravel().copy()
+        error_m, delta_v, error_cost, exit_cost, nis, reward = values[_NUMBERS].tolist()
+        (measured,), (terminated,), (truncated,) = flags.tolist()
         info: dict[str, Any] = {
             "true_state": values[_TRUE_STATE],
             "estimate": values[_ESTIMATE],
@@ -165,15 +153,15 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "error_cost_m_s": error_cost,
             "exit_cost_m_s": exit_cost,
             "nis": nis,
-            "measured": flags[_MEASURED][0],
+            "measured": measured,
             "phase": integers.item(_PHASE),
         }
         if self._varied:
             info["variant"] = integers.item(_VARIANT)
         if self._analysis:
-            for name, _, block, place in info_keys.keys_of(self.scenario, analysis=True)[len(info) :]:
-                info[name] = self.simulation.results.blocks[block][place, 0]
-        return info
+            for name, _, place_block, place in info_keys.keys_of(self.scenario, analysis=True)[len(info) :]:
+                info[name] = self.simulation.results.blocks[place_block][place, 0].copy()
+        return info, reward, terminated, truncated
 
     def _show(self) -> None:
         """Record where the follower is now; in mode `human` draw it."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from formation_env.envs import info_keys, interface
 from formation_env.kernel.metrics import METRICS, episode_metrics
-from formation_env.kernel.results import StepResults
+from formation_env.kernel.reused_arrays import ReusedZeros
 from formation_env.kernel.simulation import Simulation
 from formation_env.kernel.threads import check_num_threads
 from formation_env.task.loading import load_scenario
@@ -80,7 +80,9 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.simulation = Simulation(self.scenario, num_envs, analysis, check_num_threads(num_threads, num_envs))
+        self._totals_blocks = ReusedZeros([((len(METRICS), num_envs), float)])
         self._info_keys = info_keys.keys_of(self.scenario, analysis)
+        self._every_row = np.ones(num_envs, bool)
         self._keyed = False
         self._waiting = np.empty(0, np.intp)  # rows that ended and are not reset yet
 
@@ -161,8 +163,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         if len(self._waiting):  # they begin in this step; what they flew is overwritten
             simulation.reset(self._waiting, observations)
             simulation.forget_ends(self._waiting)
-        results = simulation.results
-        rewards, terminations, truncations = (results[name] for name in ("reward", "terminated", "truncated"))
+        rewards, terminations, truncations = map(simulation.results.__getitem__, ("reward", "terminated", "truncated"))
         ended = complete = _NO_ROWS
         if num_ended:
             ended = complete = np.flatnonzero(terminations | truncations)
@@ -195,30 +196,29 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
 
     def _totals(self, rows: NDArray[np.intp]) -> dict[str, Any]:
         """Totals of rows that flew to their episode's end, in Gymnasium's form."""
-        columns = np.zeros((len(METRICS), self.num_envs))
+        (columns,) = self._totals_blocks.take_for(rows)
         columns[:, rows] = list(episode_metrics(self.simulation, rows).values())
-        mask = self._mask(rows)
-        totals = info_keys.with_mask(dict(zip(METRICS, columns, strict=True)), mask)
-        return {info_keys.TOTALS: totals, f"_{info_keys.TOTALS}": mask.copy()}
+        totals = info_keys.with_mask(dict(zip(METRICS, columns, strict=True)), self._mask(rows))
+        return {info_keys.TOTALS: totals, f"_{info_keys.TOTALS}": self._mask(rows)}
 
     def _begin_next(
         self, observations: Observations, ended: NDArray[np.intp], totals: dict[str, Any]
     ) -> dict[str, Any]:
         """Reset the rows that ended; their last observations and infos, in Gymnasium's form."""
         final_info = self._infos(ended) | totals
-        final_obs = np.full(self.num_envs, None, dtype=object)
+        final_obs = np.empty(self.num_envs, object)  # None everywhere
         for row, observation in zip(ended.tolist(), observations[ended], strict=True):
             final_obs[row] = observation
         self.simulation.reset(ended, observations)
-        mask = self._mask(ended)
-        return {"final_info": final_info, "_final_info": mask, "final_obs": final_obs, "_final_obs": mask.copy()}
+        masks = {"_final_info": self._mask(ended), "_final_obs": self._mask(ended)}
+        return {"final_info": final_info, "final_obs": final_obs, **masks}
 
     def _infos(self, rows: NDArray[np.intp] | None = None) -> dict[str, Any]:
         """Infos of the last step or reset in Gymnasium's form, of all rows or zero but for some."""
-        results: StepResults = self.simulation.results
-        mask = np.ones(self.num_envs, bool) if rows is None else self._mask(rows)
-        shown = results if rows is None else results.only(rows)
-        return info_keys.batched(self._info_keys, shown, mask)
+        simulation = self.simulation
+        if rows is None:
+            return info_keys.batched(self._info_keys, simulation.results, self._every_row.copy())
+        return info_keys.batched(self._info_keys, simulation.last_results(rows), self._mask(rows))
 
     def _mask(self, rows: NDArray[np.intp]) -> Flags:
         """Which rows are among some (num_envs,)."""

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from formation_env.kernel.simulation import ALL_ROWS, Rows, Simulation
 from formation_env.numerics.arrays import Array
@@ -111,26 +112,25 @@ METRICS: Final = {metric.name: metric for metric in _METRICS}
 def episode_metrics(simulation: Simulation, rows: Rows = ALL_ROWS) -> dict[str, Array]:
     """Metrics of the episodes of some rows up to now, each (rows,)."""
     totals = simulation.totals(rows)
-    steps = simulation.read("step", rows)
+    variant = totals["variant"].astype(np.intp)
     episodes = EpisodeTotals(
-        steps=steps,
+        steps=totals["step"],
         reward=totals["sum_reward"],
         delta_v_m_s=totals["sum_delta_v"],
         error_m=totals["sum_error"],
         square_m2=totals["sum_square_error"],
         max_error_m=totals["max_error"],
         arrival_error_m=totals["arrival_error"],
-        final_error_m=_final_error(simulation, rows, steps),
+        final_error_m=_final_error(simulation, rows, totals["step"], variant),
         tolerated=totals["tolerated"],
         lost=totals["lost"],
-        hold_steps=simulation.schedule[simulation.variant(rows), 0, OFFSETS["counts_left"]],
+        hold_steps=simulation.schedule[variant, 0, OFFSETS["counts_left"]],
     )
     return {name: metric.formula(episodes) for name, metric in METRICS.items()}
 
 
-def _final_error(simulation: Simulation, rows: Rows, steps: Array) -> Array:
+def _final_error(simulation: Simulation, rows: Rows, steps: Array, variant: NDArray[np.intp]) -> Array:
     """Position error at the end of the plan (rows,); an early end counts as staying at the distance limit."""
-    error = simulation.read("position_error", rows)
-    num_steps, limit_m = simulation.plan_limits[simulation.variant(rows)].T
-    early = simulation.read("terminated", rows, bool) & (steps < num_steps)
-    return np.where(early, np.maximum(error, limit_m), error)
+    error, terminated = simulation.results["position_error"][rows], simulation.results["terminated"][rows]
+    num_steps, limit_m = simulation.plan_limits[variant].T
+    return np.where(terminated & (steps < num_steps), np.maximum(error, limit_m), error)

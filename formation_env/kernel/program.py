@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numba import types
 from numpy.typing import NDArray
 
 from formation_env.files import hash_sources
@@ -24,10 +25,11 @@ from formation_env.kernel.stages import (
     true_motion,
 )
 from formation_env.kernel.stages.memory import Flags, Integers
-from formation_env.kernel.tile import MODELS
+from formation_env.kernel.tile import MODELS, STATE_SIZE, WORK32_SIZE, WORK_SIZE
 from formation_env.numerics.arrays import Array, Array32
-from formation_env.numerics.jit import LANES, compiled_program
+from formation_env.numerics.jit import LANES, compiled_program, entry_point, inline_scalar
 from formation_env.task.scenario import Scenario
+from formation_env.task.schedule import WIDTH
 
 Streams = NDArray[np.uint32]
 Rows = NDArray[np.intp]
@@ -65,22 +67,42 @@ class Program(NamedTuple):
     Arguments that they share:
         states, streams: what the rows carry (tiles, STATE_SIZE) and (tiles, STREAM_SIZE), updated.
         keys: of the rows' random numbers, with the number of the next episode (rows, 3).
-        work, work32, own: scratch space; `own` for the settings of the rows' variants.
         schedule, seen, packed: what the scenario's variants need, `packing.pack_variants`.
         observations: (rows, SIZE), written.
         results, flags, integers, noises: blocks (fields, rows), written; no fields of `noises` if nobody asks.
 
     Attributes:
         step: fly the rows of the tiles from first to last - 1 over one step, under actions (rows, 3); returns how many
-            episodes ended. Threads may step different tiles at once, each with scratch space of its own.
-        reset: start the next episode of the rows `rows` (k,), side by side in a spare tile, from `starts`: states
-            (k, 6) to start at exactly if `given`, else each variant's nominal start (variants, 6).
-        look: write the observations of all rows again.
+            episodes ended. Threads may step different tiles at once.
+        reset: start the next episode of the rows `rows` (k,) from `starts`: states (k, 6) to start at exactly if
+            `given`, else each variant's nominal start (variants, 6).
     """
 
     step: Any
     reset: Any
-    look: Any
+
+
+_BLOCK, _BLOCK32 = types.float64[:, ::1], types.float32[:, ::1]
+TYPES: Final = {
+    "states": _BLOCK,
+    "streams": types.uint32[:, ::1],
+    "keys": types.uint64[:, ::1],
+    "schedule": types.float64[:, :, ::1],
+    "seen": types.float32[:, :, ::1],
+    "packed": _BLOCK,
+    "first": types.intp,
+    "last": types.intp,
+    "rows": types.intp[::1],
+    "starts": _BLOCK,
+    "given": types.boolean,
+    "actions": _BLOCK32,
+    "observations": _BLOCK32,
+    "results": _BLOCK,
+    "flags": types.boolean[:, ::1],
+    "integers": types.int64[:, ::1],
+    "noises": _BLOCK,
+}
+"""The types of the arguments of a program, by name; all arrays are C-contiguous."""
 
 
 def kinds_of(scenario: Scenario, num_variants: int) -> Kinds:
@@ -96,9 +118,28 @@ def kinds_of(scenario: Scenario, num_variants: int) -> Kinds:
 
 @cache
 def program(kinds: Kinds) -> Program:
-    """The compiled functions for some kinds."""
+    """The compiled functions for some kinds; they are compiled here, or read from the cache on disk."""
+    return Program(*(entry_point(function, TYPES) for function in dispatchers(kinds)))
+
+
+@cache
+def look() -> Any:
+    """The compiled function that writes the observations of all rows again; the arguments are those of `Program`."""
+    return entry_point(look_dispatcher(), TYPES)
+
+
+@cache
+def dispatchers(kinds: Kinds) -> Program:
+    """The functions of `program` as numba holds them, with what it knows of its cache."""
     sources = _source_hash()
-    return Program(_step(kinds, sources), _reset(kinds, sources), _look(sources))
+    return Program(_step(kinds, sources), _reset(kinds, sources))
+
+
+@inline_scalar
+def new_scratch(schedule: Array, varied: bool) -> tuple[Array, Array32, Array]:
+    """Scratch space for a tile: double, single, and the settings of the rows' variants."""
+    width = WORK_SIZE + (schedule.shape[2] - WIDTH) * LANES
+    return np.empty(width), np.empty(WORK32_SIZE, np.float32), np.empty(settings.SIZE * LANES if varied else 0)
 
 
 # Long: numba takes the arrays one by one, and the order of the stages is best read at one place.
@@ -114,9 +155,6 @@ def _step(kinds: Kinds, sources: str) -> Any:
     def step(
         states: Array,
         streams: Streams,
-        work: Array,
-        work32: Array32,
-        own: Array,
         schedule: Array,
         seen: Array32,
         packed: Array,
@@ -130,6 +168,7 @@ def _step(kinds: Kinds, sources: str) -> Any:
         noises: Array,
     ) -> int:
         """Fly rows over one step; the arguments are those of `Program`."""
+        work, work32, own = new_scratch(schedule, varied)
         ended, known_line = 0, -1
         for index in range(first, last):
             state, row = states[index], index * LANES
@@ -173,11 +212,6 @@ def _reset(kinds: Kinds, sources: str) -> Any:
         states: Array,
         streams: Streams,
         keys: NDArray[np.uint64],
-        spare: Array,
-        spare_stream: NDArray[np.uint32],
-        work: Array,
-        work32: Array32,
-        own: Array,
         schedule: Array,
         seen: Array32,
         packed: Array,
@@ -190,7 +224,9 @@ def _reset(kinds: Kinds, sources: str) -> Any:
         integers: Integers,
         noises: Array,
     ) -> None:
-        """Start the next episode of some rows; the arguments are those of `Program`."""
+        """Start the next episode of some rows, side by side in a spare tile; the arguments are those of `Program`."""
+        work, work32, own = new_scratch(schedule, varied)
+        spare, spare_stream = np.empty(STATE_SIZE), np.empty(noise.STREAM_SIZE, np.uint32)
         for first in range(0, len(rows), LANES):
             n = min(LANES, len(rows) - first)
             start.clear(spare, work)
@@ -220,14 +256,14 @@ def _reset(kinds: Kinds, sources: str) -> Any:
     return reset
 
 
-def _look(sources: str) -> Any:
-    """Compile the repetition of the observations."""
+@cache
+def look_dispatcher() -> Any:
+    """The function of `look` as numba holds it."""
 
-    @compiled_program("look", sources)
-    def look(
-        states: Array, work: Array, work32: Array32, schedule: Array, seen: Array32, observations: Array32
-    ) -> None:
+    @compiled_program("look", _source_hash())
+    def look(states: Array, schedule: Array, seen: Array32, observations: Array32) -> None:
         """Write the observations of all rows; the arguments are those of `Program`."""
+        work, work32, _ = new_scratch(schedule, False)
         for index in range(len(states)):
             state, row = states[index], index * LANES
             n = min(LANES, len(observations) - row)

@@ -71,13 +71,11 @@ class StepResults:
         """The same values, of nobody else."""
         return StepResults(tuple(block.copy() for block in self.blocks), self.num_rows)
 
-    def only(self, rows: NDArray[np.intp]) -> "StepResults":
-        """The values of some rows in their places, zero elsewhere."""
-        part = StepResults.zeros(self.num_rows, len(self.blocks[-1]) > 0)
-        for mine, whole in zip(part.blocks, self.blocks, strict=True):
-            if len(mine):
-                mine[:, rows] = whole[:, rows]
-        return part
+    def only(self, rows: NDArray[np.intp], blocks: Arrays) -> "StepResults":
+        """The values of some rows, in blocks that are zero elsewhere."""
+        for mine, whole in zip(blocks, self.blocks, strict=False):
+            mine[:, rows] = whole[:, rows]
+        return StepResults(blocks, self.num_rows)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """A field by name, a view (rows,) or (rows, size)."""

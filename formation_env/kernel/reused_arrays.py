@@ -4,7 +4,8 @@ Large arrays that are made anew at each step cost more than what is written into
 by page, cleared.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from sys import getrefcount
 from typing import Any, Final
 
@@ -25,27 +26,51 @@ def _held(arrays: Arrays) -> int:
 
 
 _HELD_BY_NOBODY: Final = _held((np.empty(1),))
+_NO_ROWS: Final = np.empty(0, np.intp)
+
+
+@dataclass
+class _Kept:
+    arrays: Arrays
+    written: NDArray[np.intp]  # rows that are not zero
 
 
 class ReusedArrays:
     """Gives out arrays of the same shapes, uninitialised; those that have been dropped once more."""
 
+    _make: Callable[..., NDArray[Any]] = staticmethod(np.empty)
+
     def __init__(self, shapes: Sequence[Shape]) -> None:
         """Take shape and type of each array."""
         self._shapes = tuple(shapes)
-        self._is_kept = max(array.nbytes for array in self._new()) >= LEAST_BYTES
-        self._kept: list[Arrays] = []
-
-    def _new(self) -> Arrays:
-        return tuple([np.empty(shape, dtype) for shape, dtype in self._shapes])
+        self._kept: list[_Kept] = []
+        self._is_kept = False
+        self._is_kept = max(array.nbytes for array in self.take()) >= LEAST_BYTES
 
     def take(self) -> Arrays:
         """Arrays that nobody else holds."""
-        if not self._is_kept:
-            return self._new()
-        for arrays in self._kept:
-            if _held(arrays) <= _HELD_BY_NOBODY:
-                return arrays
-        arrays = self._new()
-        self._kept = [arrays, *self._kept[: MOST_KEPT - 1]]
-        return arrays
+        return self._take().arrays
+
+    def _take(self) -> _Kept:
+        for kept in self._kept:
+            if _held(kept.arrays) <= _HELD_BY_NOBODY:
+                return kept
+        made = _Kept(tuple([self._make(shape, dtype) for shape, dtype in self._shapes]), _NO_ROWS)
+        if self._is_kept:
+            self._kept = [made, *self._kept[: MOST_KEPT - 1]]
+        return made
+
+
+class ReusedZeros(ReusedArrays):
+    """Gives out arrays (fields, rows) of zeros; the rows that were written are cleared before the next use."""
+
+    _make = staticmethod(np.zeros)
+
+    def take_for(self, rows: NDArray[np.intp]) -> Arrays:
+        """Arrays that nobody else holds, zero everywhere, of which only some rows may be written."""
+        kept = self._take()
+        if len(kept.written):
+            for array in kept.arrays:
+                array[:, kept.written] = 0
+        kept.written = rows
+        return kept.arrays

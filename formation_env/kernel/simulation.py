@@ -1,26 +1,24 @@
 """Rows of episodes of one scenario: the arrays of the compiled program, and their values by name."""
 
-from functools import partial
 from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_env.kernel import settings
 from formation_env.kernel.packing import pack_variants
-from formation_env.kernel.program import kinds_of, program
+from formation_env.kernel.program import kinds_of, look, program
 from formation_env.kernel.results import RESULT_NAMES, StepResults, block_shapes
-from formation_env.kernel.reused_arrays import ReusedArrays
+from formation_env.kernel.reused_arrays import ReusedArrays, ReusedZeros
 from formation_env.kernel.stages.noise import STREAM_SIZE
 from formation_env.kernel.threads import run_parts
-from formation_env.kernel.tile import STATE, STATE_SIZE, TOTALS, WORK32_SIZE, WORK_SIZE, State
+from formation_env.kernel.tile import STATE, STATE_SIZE, TOTALS, State
 from formation_env.numerics.arrays import Array, Array32
 from formation_env.numerics.jit import LANES
 from formation_env.numerics.random_streams import stream_key
 from formation_env.task import observation
 from formation_env.task.scenario import Scenario
-from formation_env.task.schedule import OFFSETS, WIDTH
+from formation_env.task.schedule import OFFSETS
 from formation_env.task.variants import draw_variants
 
 Rows = slice | NDArray[np.intp]
@@ -42,7 +40,7 @@ class Simulation:
         schedule: the plans' tables (variants, steps, columns), see `schedule.FIELDS`; a shorter one repeats its end.
         plan_limits: steps of each variant's plan and its distance limit, m (variants, 2).
         actions: (num_rows, 3) float32, to be filled before `step`.
-        results: of the last step or reset; blocks of its own, so a later step does not change them.
+        results: of the last step or reset; `step` makes new ones, and does not change those that came before.
     """
 
     def __init__(self, scenario: Scenario, num_rows: int, with_noises: bool = False, num_threads: int = 1) -> None:
@@ -61,33 +59,19 @@ class Simulation:
         self.schedule, self._seen, self._settings = pack_variants(self.variants)
         self.actions = np.zeros((num_rows, 3), np.float32)
         self._with_noises = with_noises
-        self._blocks = ReusedArrays(block_shapes(num_rows, with_noises))
+        shapes = block_shapes(num_rows, with_noises)
+        self._blocks, self._last_blocks = ReusedArrays(shapes), ReusedZeros(shapes)
         self._observations = ReusedArrays([((num_rows, observation.SIZE), np.float32)])
         self.results = StepResults.zeros(num_rows, with_noises)
         self._states = np.zeros((tiles, STATE_SIZE))
         self._streams = np.zeros((tiles, STREAM_SIZE), np.uint32)
         self._keys = np.zeros((num_rows, 3), np.uint64)
-        self._scratch = self._new_scratch()
-        self._spare = np.zeros(STATE_SIZE), np.zeros(STREAM_SIZE, np.uint32)
+        self._arrays = (self._states, self._streams, self.schedule, self._seen, self._settings)
         num_parts = min(num_threads, tiles)
-        ends = [tiles * part // num_parts for part in range(num_parts + 1)]
-        self._parts = [self._new_part(*span) for span in pairwise(ends)]
-        self._first_part, *others = self._parts
-        self._is_split = bool(others)
+        self._parts = list(pairwise(tiles * part // num_parts for part in range(num_parts + 1)))
         self._kinds = kinds_of(scenario, len(self.variants))
         self.plan_limits = np.array([(each.num_steps, each.limits.max_distance_m) for each in self.variants])
         self._nominal_starts = np.array([each.start.formation.state(each.orbit) for each in self.variants])
-
-    def _new_scratch(self) -> tuple[Array, Array32, Array]:
-        """Scratch space of a step: double, single, and the settings of the rows' variants."""
-        width = WORK_SIZE + (self.schedule.shape[2] - WIDTH) * LANES
-        own = settings.SIZE * LANES if len(self.variants) > 1 else 0
-        return np.zeros(width), np.zeros(WORK32_SIZE, np.float32), np.zeros(own)
-
-    def _new_part(self, first: int, last: int) -> tuple[Any, ...]:
-        """First arguments of the compiled step for the tiles from first to last - 1, with their scratch space."""
-        scratch = self._new_scratch() if first else self._scratch
-        return (self._states, self._streams, *scratch, self.schedule, self._seen, self._settings, first, last)
 
     def seed(self, row: int, generator: np.random.Generator) -> None:
         """Give a row a new random stream; its next episode is the stream's first."""
@@ -106,13 +90,11 @@ class Simulation:
             self._states,
             self._streams,
             self._keys,
-            *self._spare,
-            *self._scratch,
             self.schedule,
             self._seen,
             self._settings,
             rows,
-            self._nominal_starts if starts is None else np.ascontiguousarray(starts),
+            self._nominal_starts if starts is None else np.ascontiguousarray(starts, float),
             starts is not None,
             observations,
             *self.results.blocks,
@@ -129,15 +111,22 @@ class Simulation:
         """
         del self.results  # so that its blocks are written again if nobody else holds them
         self.results = StepResults(self._blocks.take(), self.num_rows)
-        if self._is_split:
-            return run_parts(partial(self._step_part, observations), len(self._parts))
-        ended: int = program(self._kinds).step(*self._first_part, self.actions, observations, *self.results.blocks)
-        return ended
-
-    def _step_part(self, observations: Array32, part: int) -> int:
-        """Fly the rows of a part; returns how many of its episodes ended."""
+        if len(self._parts) == 1:
+            return self.step_in_place(observations)
         step = program(self._kinds).step
-        ended: int = step(*self._parts[part], self.actions, observations, *self.results.blocks)
+        arrays, others = self._arrays, (self.actions, observations, *self.results.blocks)
+
+        def fly(part: int) -> int:
+            ended: int = step(*arrays, *self._parts[part], *others)
+            return ended
+
+        return run_parts(fly, len(self._parts))
+
+    def step_in_place(self, observations: Array32) -> int:
+        """Fly all rows over one step like `step`, in this thread, and write `results` where the last ones stand."""
+        blocks, num_tiles = self.results.blocks, len(self._states)
+        step = program(self._kinds).step
+        ended: int = step(*self._arrays, 0, num_tiles, self.actions, observations, *blocks)
         return ended
 
     def forget_ends(self, rows: NDArray[np.intp]) -> None:
@@ -151,6 +140,10 @@ class Simulation:
             self.results = self.results.copy()
         else:
             self.results = StepResults.zeros(self.num_rows, self._with_noises)
+
+    def last_results(self, rows: NDArray[np.intp]) -> StepResults:
+        """The results of some rows as they are now, zero elsewhere; no later step or reset changes them."""
+        return self.results.only(rows, self._last_blocks.take_for(rows))
 
     def memory(self) -> Array:
         """Copy of the rows' state, random streams included, for `recall`: numbers (k,) of any meaning."""
@@ -166,8 +159,7 @@ class Simulation:
 
     def look(self, observations: Array32) -> None:
         """Write the observations (num_rows, SIZE) of all rows again, as the last step or reset left them."""
-        work, work32, _ = self._scratch
-        program(self._kinds).look(self._states, work, work32, self.schedule, self._seen, observations)
+        look()(self._states, self.schedule, self._seen, observations)
 
     def new_observations(self) -> NDArray[np.float32]:
         """Uninitialised array (num_rows, SIZE) for the observations of all rows."""

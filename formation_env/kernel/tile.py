@@ -131,8 +131,8 @@ NUM_RESULTS: Final = sum(Results())
 SHOWN: Final = RESULTS.reward
 """How many of the results infos show; the reward behind them is returned by itself."""
 NUM_NOISES: Final = sum(Noises())
-TOTALS: Final = State._fields[State._fields.index("sum_reward") :]
-"""Names of the totals of the episode, the last fields of a row's state."""
+TOTALS: Final = State._fields[State._fields.index("step") :]
+"""Names of the totals of the episode and what goes with them, the last fields of a row's state."""
 MODELS: Final = WORK_SIZE // LANES
 """Place of the first number of the row's varying models, counted in numbers."""
 

@@ -4,8 +4,9 @@ An inlined scalar function works on one row's scalars. It is inlined where it is
 a tile has a body of scalars only, which the compiler turns into vector instructions.
 """
 
+import inspect
 import warnings
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from typing import Any, Final, TypeVar, cast
 
 import numba
@@ -56,6 +57,22 @@ def compiled_program(*key: Hashable) -> Callable[[F], F]:
         key: tells it from others of the same source in the cache on disk: what was chosen, and a hash of all sources.
     """
     return lambda function: _cached(function, key)
+
+
+def entry_point(function: F, types: Mapping[str, Any]) -> F:
+    """A compiled function for arguments of fixed types, which numba need not look at in each call.
+
+    Whoever calls it vouches for them: strides that differ are not noticed.
+
+    Args:
+        function: of `compiled_program` or `compiled_loop`.
+        types: numba's type of each argument, by its name; other names are left alone.
+    """
+    if not isinstance(function, Dispatcher):  # with NUMBA_DISABLE_JIT
+        return function
+    signature = tuple(types[name] for name in inspect.signature(function.py_func).parameters)
+    function.compile(signature)
+    return cast(F, function.get_overload(signature))
 
 
 def _cached(function: F, key: tuple[Hashable, ...] | None) -> F:

@@ -8,14 +8,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
 import pytest
 from cli_helpers import environment, write_metadata
 from typer.testing import CliRunner, Result
 
 from formation_env.cli import app
-from formation_env.evaluation import bench, bench_stages, soak
+from formation_env.evaluation import bench, soak
 from formation_env.evaluation.soak import Reading
+from formation_env.kernel import stage_times
 
 
 def run(*arguments: str | Path) -> Result:
@@ -27,8 +27,8 @@ def test_bench_prints_stages_memory_and_rows(monkeypatch: pytest.MonkeyPatch, tm
     """All four tables of a small batch, and the plot in a folder that it makes."""
     for name, number in {"_SINGLE_STEPS": 2, "_BATCH_STEPS": 2, "_ROUNDS": 1, "_BATCH_ROUNDS": 1}.items():
         monkeypatch.setattr(bench, name, number)
-    times = pd.DataFrame({"stage": ["noise.draw", "whole step"], "ns_per_row": [5.0, 50.0]})
-    monkeypatch.setattr(bench_stages, "stage_times", lambda scenario, rows: times)  # it compiles each stage
+    times = {"noise.draw": 5.0, stage_times.WHOLE: 50.0}
+    monkeypatch.setattr(stage_times, "stage_times", lambda scenario, rows: times)  # it compiles each stage
     path = tmp_path / "new" / "rows.png"
     result = run("bench", "keeping", "--rows", "2", "--max-rows", "16", "--plot", path)
     assert result.exit_code == 0, result.output

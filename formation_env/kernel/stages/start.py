@@ -44,10 +44,9 @@ def first_doubt(state: Array, i: int, settings: Scalars) -> None:
 
 @tile_function
 def clear(state: Array, work: Array) -> None:
-    """Begin with zeros everywhere but for the variant."""
+    """Begin with zeros."""
     for k in range(STATE_SIZE):
-        if k < STATE.variant or k >= STATE.variant + LANES:
-            state[k] = 0.0
+        state[k] = 0.0
     for k in range(WORK.thrust, WORK.thrust + 3 * LANES):
         work[k] = 0.0
     for i in range(LANES):

@@ -1,4 +1,4 @@
-"""The cache is filled by one flight: what was compiled, found or loaded."""
+"""The cache is filled: what was compiled, found or loaded."""
 
 import os
 import subprocess
@@ -35,11 +35,11 @@ def test_a_full_cache_serves_every_way_to_fly(tmp_path: Path) -> None:
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(Path(__file__).parents[3])}
     code = (
         "import numpy as np, formation_env as f;"
-        "from formation_env.kernel.program import kinds_of, program;"
+        "from formation_env.kernel.program import dispatchers, kinds_of, look_dispatcher;"
         "e = f.FormationEnv('keeping', analysis=True); e.reset(seed=0, options={'initial_state': np.ones(6)});"
         "e.step([0, 0, 0]); v = f.FormationVectorEnv(70, analysis=True); v.reset(seed=0);"
         "v.reset(options={'reset_mask': np.arange(70) < 2}); v.step(v.action_space.sample());"
-        "p = program(kinds_of(e.unwrapped.scenario, 1));"
+        "p = (*dispatchers(kinds_of(e.unwrapped.scenario, 1)), look_dispatcher());"
         "print([sum(each.stats.cache_misses.values()) for each in p])"
     )
     fill = "from formation_env.evaluation.fill_cache import fill_cache; print(fill_cache('keeping').origins)"
@@ -53,7 +53,6 @@ def test_a_full_cache_serves_every_way_to_fly(tmp_path: Path) -> None:
 
 def test_without_compilation_there_is_nothing_to_fill(monkeypatch: pytest.MonkeyPatch) -> None:
     """NUMBA_DISABLE_JIT leaves plain functions."""
-    plain = module.Program(print, print, print)
-    monkeypatch.setattr(module, "program", lambda kinds: plain)
+    monkeypatch.setattr(module, "look_dispatcher", lambda: print)
     with pytest.raises(RuntimeError, match="NUMBA_DISABLE_JIT"):
         fill_cache("keeping")

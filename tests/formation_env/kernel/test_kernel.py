@@ -198,9 +198,9 @@ def test_the_program_carries_the_hash_of_its_sources() -> None:
 def test_the_key_of_the_cache_is_the_same_in_each_process() -> None:
     """A program closes over functions, which are new in each process: its key holds names and a hash alone."""
     kinds = program.kinds_of(load_scenario("keeping"), 1)
-    for function in program.program(kinds):
-        chosen = () if function.py_func.__name__ == "look" else (kinds,)
-        assert function._cache._key == (function.py_func.__name__, *chosen, program._source_hash())
+    for function in program.dispatchers(kinds):
+        assert function._cache._key == (function.py_func.__name__, kinds, program._source_hash())
+    assert program.look_dispatcher()._cache._key == ("look", program._source_hash())
 
 
 def test_reset_writes_the_rows_asked_for_only() -> None:

@@ -9,7 +9,7 @@ import pytest
 from env_helpers import random_actions
 
 from formation_env import FormationVectorEnv
-from formation_env.kernel.reused_arrays import LEAST_BYTES, ReusedArrays
+from formation_env.kernel.reused_arrays import LEAST_BYTES, ReusedArrays, ReusedZeros
 
 LARGE = (8, LEAST_BYTES // 8)
 
@@ -45,6 +45,22 @@ def test_what_is_dropped_is_given_again() -> None:
     place = reused.take()[0].ctypes.data
     assert reused.take()[0].ctypes.data == place
     assert copy.deepcopy(reused).take()[0].ctypes.data != place
+
+
+@pytest.mark.parametrize("rows", [4, LEAST_BYTES // 8])
+def test_zeros_are_zero_again_but_for_what_is_held(rows: int) -> None:
+    """Each time other rows are written; arrays that somebody holds keep what was written into them."""
+    zeros, first = ReusedZeros([((2, rows), np.float64), ((1, rows), np.bool_)]), None
+    for row in (0, 2, 1, 3):
+        arrays = zeros.take_for(np.array([row]))
+        assert not any(array.any() for array in arrays)
+        for array in arrays:
+            array[:, row] = 1
+        if first is None:
+            first = arrays[0]
+    assert first is not None
+    assert first[:, 0].all()
+    assert first.sum() == 2
 
 
 @pytest.mark.parametrize("rows", [1, 64, 2048])

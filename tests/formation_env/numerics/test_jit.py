@@ -115,9 +115,8 @@ def test_a_read_only_installation_without_a_home_imports() -> None:
         "for locator in caching.CacheImpl._locator_classes:\n"
         "    locator.from_function = classmethod(lambda cls, *_: None)\n"
         "import baselines.design.riccati, formation_env\n"
-        "from formation_env.kernel.program import program\n"
-        "from formation_env.kernel.program import Kinds\n"
-        "program(Kinds('constant', 'constant', 'position', 'ideal', False)), formation_env.FormationEnv()"
+        "from formation_env.kernel.program import Kinds, dispatchers\n"
+        "dispatchers(Kinds('constant', 'constant', 'position', 'ideal', False)), formation_env.FormationEnv()"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert run.returncode == 0, run.stderr

@@ -2,15 +2,14 @@
 
 import time
 from collections.abc import Callable
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple, cast
 
 import numba
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from formation_env.kernel import packing, settings, variants
-from formation_env.kernel.program import MOTIONS, Kinds, kinds_of, program
+from formation_env.kernel.program import MOTIONS, Kinds, kinds_of, new_scratch
 from formation_env.kernel.simulation import Simulation
 from formation_env.kernel.stages import kalman_filter, link, memory, noise, observe, plan, reward, sensor, thruster
 from formation_env.kernel.stages.memory import Flags, Integers
@@ -50,7 +49,7 @@ class _Arrays(NamedTuple):
     known_line: NDArray[np.intp]
 
 
-def stage_times(scenario: Scenario, rows: int, rounds: int = _ROUNDS) -> pd.DataFrame:
+def stage_times(scenario: Scenario, rows: int, rounds: int = _ROUNDS) -> dict[str, float]:
     """Time per row of each stage in the order of the step, and of the whole step called from Python.
 
     The state is restored before each call. The time of a call that does nothing is subtracted from that of a stage.
@@ -61,7 +60,7 @@ def stage_times(scenario: Scenario, rows: int, rounds: int = _ROUNDS) -> pd.Data
         rounds: calls of each stage, of which the fastest counts.
 
     Returns:
-        Columns: stage, ns_per_row.
+        ns per row of each stage, and of `WHOLE`.
     """
     simulation, arrays = _in_flight(scenario, rows)
     kinds = kinds_of(scenario, len(simulation.variants))
@@ -85,11 +84,8 @@ def stage_times(scenario: Scenario, rows: int, rounds: int = _ROUNDS) -> pd.Data
 
     nothing = alone(_nothing)
     times = {name: max(alone(call) - nothing, 0.0) for name, call in _calls(kinds).items()}
-    step, blocks = program(kinds).step, simulation.results.blocks
-    whole = (*simulation._first_part, arrays.actions, arrays.observations, *blocks)
-    times[WHOLE] = seconds(lambda count: [step(*whole) for _ in range(count)])
-    lines = [(name, taken / (passes * rows) * 1e9) for name, taken in times.items()]
-    return pd.DataFrame(lines, columns=["stage", "ns_per_row"])
+    times[WHOLE] = seconds(lambda count: [simulation.step_in_place(arrays.observations) for _ in range(count)])
+    return {name: taken / (passes * rows) * 1e9 for name, taken in times.items()}
 
 
 def _in_flight(scenario: Scenario, rows: int) -> tuple[Simulation, _Arrays]:
@@ -102,7 +98,8 @@ def _in_flight(scenario: Scenario, rows: int) -> tuple[Simulation, _Arrays]:
     simulation.reset(np.arange(rows), observations)
     simulation.actions[:] = generator.uniform(-1, 1, simulation.actions.shape)
     simulation.step(observations)
-    states, streams, work, work32, own, schedule, seen, packed, _, _ = simulation._first_part
+    states, streams, schedule, seen, packed = simulation._arrays
+    work, work32, own = cast(Any, new_scratch).py_func(schedule, len(simulation.variants) > 1)
     results, flags, integers, _ = simulation.results.blocks
     numbers = own if len(own) else packed
     known_line = np.full(1, -1, np.intp)
