@@ -141,7 +141,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         """Give streams to those of some rows that have a seed, or to all of them that have none yet."""
         keyed = [row for row in rows.tolist() if seeds[row] is not None or not self._keyed]
         for row in keyed:
-            self.simulation.seed(row, gymnasium.utils.seeding.np_random(seeds[row])[0])
+            self.simulation.seed(row, np.random.default_rng(seeds[row]))  # as Gymnasium seeds a single one
         self._keyed = True
 
     def step(self, actions: Any) -> tuple[Observations, NDArray[np.float64], Flags, Flags, dict[str, Any]]:

@@ -28,8 +28,8 @@ _ANGLE: Final = np.float32(np.pi / 2 / 2.0**31)
 
 
 def stream_key(generator: np.random.Generator) -> NDArray[np.uint64]:
-    """Draw the key (2,) of a new stream."""
-    return generator.integers(0, 2**64, size=2, dtype=np.uint64)
+    """Draw the key (2,) of a new stream: the generator's next words, as they are."""
+    return generator.bit_generator.random_raw(2)
 
 
 @inline_scalar
