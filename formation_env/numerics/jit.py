@@ -14,6 +14,8 @@ from numba.core.caching import FunctionCache
 from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic, register_jitable
 
+from formation_env.numerics.inner_functions import InnerCompiler
+
 F = TypeVar("F", bound=Callable[..., Any])
 
 LANES: Final = 64
@@ -25,8 +27,13 @@ FAST_MATH: Final = False
 
 
 _ARITHMETIC: Final[dict[str, Any]] = {"fastmath": FAST_MATH, "error_model": "numpy"}
-# Only compiled code calls these, so they need no way in from Python or C, which saves a quarter of the compile time.
-_INNER: Final[dict[str, Any]] = {**_ARITHMETIC, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+# Only compiled code calls these, so they need no way in from Python or C, and no machine code of their own.
+_INNER: Final[dict[str, Any]] = {
+    **_ARITHMETIC,
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "pipeline_class": InnerCompiler,
+}
 
 
 def inline_scalar(function: F) -> F:

@@ -45,7 +45,7 @@ SENSE: Final = (FIELDS, FIELDS, FIELDS32, TABLE, INT)
 STAGES: Final = {
     plan.advance: ((FIELDS, INT), 1),
     plan.broadcast_line: ((FIELDS, INT, INT, FIELDS, INT, INT), 1),
-    plan.read_plan: ((FIELDS, FIELDS, FIELDS32, PLANS, VIEWS, INT, INT), 14),
+    plan.read_plan: ((FIELDS, FIELDS, FIELDS32, PLANS, VIEWS, INT, INT), 15),
     noise.draw: ((STREAM, FIELDS32, INT), 2),
     thruster.thrust_ideal: ((TABLE32, INT, FIELDS, FIELDS32, TABLE, INT), 1),
     link.change: ((FIELDS, FIELDS32, TABLE, INT), 1),
@@ -54,14 +54,14 @@ STAGES: Final = {
     true_motion.fly_constant: (MOTION, 1),
     true_motion.fly_varying: (MOTION, 1),
     nonlinear_motion.fly_near: (MOTION, 25),
-    nonlinear_motion.fly_far: (MOTION, 7),
+    nonlinear_motion.fly_far: (MOTION, 25),
     kalman_filter.predict_constant: (FILTER, 2),
     kalman_filter.predict_varying: (FILTER, 2),
     sensor.sense_position: (SENSE, 3),
-    sensor.sense_position_and_velocity: (SENSE, 3),
+    sensor.sense_position_and_velocity: (SENSE, 6),
     kalman_filter.innovate: ((FIELDS, FIELDS, INT), 6),
     kalman_filter.measure_position: (FILTER, 1),
-    kalman_filter.measure_position_and_velocity: (FILTER, 1),
+    kalman_filter.measure_position_and_velocity: (FILTER, 2),
     reward.score: ((FIELDS, FIELDS, TABLE, INT), 2),
     observe.observe: ((FIELDS, FIELDS, FIELDS32, INT), 13),
     start.begin: ((FIELDS, FIELDS32, BOOL, TABLE, INT), 13),
@@ -69,8 +69,8 @@ STAGES: Final = {
 }
 """Each stage that loops over the rows of a tile: its signature, and how many of its loops are vectorised with AVX2.
 
-A stage is compiled with the functions that it calls and that no stage above it calls. LLVM unrolls most loops over
-fields first, so the loop over rows inside counts once for each field.
+Loops of the functions that a stage calls are its own. LLVM unrolls most loops over fields first, so the loop over rows
+inside counts once for each field.
 """
 OVER_ROWS: Final = "range(min(n, LANES))"
 MODULES: Final = (
@@ -101,7 +101,16 @@ def compile_stages() -> None:
     functions = {numba.njit(error_model="numpy")(probe): (FIELDS,)} | {each: own for each, (own, _) in STAGES.items()}
     for function, signature in functions.items():
         print(f"stage: {name_of(function)}", file=sys.stderr, flush=True)
-        function.compile(signature)
+        called(function).compile((types.StarArgTuple(signature),))
+
+
+def called(function: Any) -> Any:
+    """A compiled function that calls a stage, which is code for its callers only."""
+
+    def call(*arguments: Any) -> Any:
+        return function(*arguments)
+
+    return numba.njit(error_model="numpy")(call)
 
 
 def name_of(function: Any) -> str:
