@@ -46,6 +46,17 @@ def tile_function(function: F) -> F:
     return cast(F, numba.njit(**_INNER)(function))
 
 
+@inline_scalar
+def turns(count: int, array: Any) -> int:
+    """A number of turns of a loop over fields, such that the compiler does not know it and writes the loop once.
+
+    Args:
+        count: the number, a constant.
+        array: any array that is longer.
+    """
+    return min(count, len(array))
+
+
 def python_and_compiled(function: F) -> F:
     """Leave a function of scalars or arrays to Python as it is, and inline it where compiled code calls it."""
     wrapped: F = register_jitable(**_ARITHMETIC, forceinline=True)(function)

@@ -22,7 +22,7 @@ from formation_env.kernel.tile import (
     plan,
 )
 from formation_env.numerics.arrays import Array, Array32
-from formation_env.numerics.jit import LANES, tile_function
+from formation_env.numerics.jit import LANES, tile_function, turns
 from formation_env.numerics.transpose import BLOCK, transpose_block
 from formation_env.task.observation import SIZE
 
@@ -57,11 +57,11 @@ def write_results(
     state: Array, work: Array, results: Array, flags: Flags, integers: Integers, first: int, n: int
 ) -> int:
     """Write a tile's results in the columns from `first` on; return how many episodes ended."""
-    for k in range(FROM_STATE):
+    for k in range(turns(FROM_STATE, state)):
         line = results[k, first:]  # from here on, so that the compiler sees that no index is negative
         for i in range(min(n, LANES)):
             line[i] = state[STATE.true_state + k * LANES + i]
-    for k in range(FROM_WORK):
+    for k in range(turns(FROM_WORK, work)):
         line = results[FROM_STATE + k, first:]
         for i in range(min(n, LANES)):
             line[i] = work[WORK.thrust + k * LANES + i]

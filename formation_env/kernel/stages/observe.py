@@ -6,7 +6,7 @@ import numpy as np
 
 from formation_env.kernel.tile import STATE, WORK32, plan, seen
 from formation_env.numerics.arrays import Array, Array32
-from formation_env.numerics.jit import LANES, inline_scalar, tile_function
+from formation_env.numerics.jit import LANES, inline_scalar, tile_function, turns
 from formation_env.numerics.single_precision import log
 from formation_env.task import observation
 from formation_env.task.schedule import SCALES
@@ -81,7 +81,7 @@ def _sigmas(state: Array, work32: Array32, i: int) -> None:
 @tile_function
 def observe(state: Array, work: Array, work32: Array32, n: int) -> None:
     """Compute the observation of each row; what depends on the plan alone stands there already."""
-    for axis in range(6):
+    for axis in range(turns(6, state)):
         for i in range(min(n, LANES)):
             error = state[STATE.estimate + axis * LANES + i] - work[REFERENCE + axis * LANES + i]
             work32[ERROR + axis * LANES + i] = np.float32(error)
@@ -89,7 +89,7 @@ def observe(state: Array, work: Array, work32: Array32, n: int) -> None:
         _miss(state, work, work32, i)
     for i in range(min(n, LANES)):
         _sigmas(state, work32, i)
-    for axis in range(3):
+    for axis in range(turns(3, state)):
         for i in range(min(n, LANES)):
             _scale(work32, i, ERROR + axis * LANES, PER_LENGTH, PER_LOG_UNIT_POS)
         for i in range(min(n, LANES)):

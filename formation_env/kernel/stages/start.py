@@ -5,7 +5,7 @@ from typing import Final
 from formation_env.kernel.settings import Scalars, scalars
 from formation_env.kernel.tile import STATE, STATE_SIZE, WORK, WORK32
 from formation_env.numerics.arrays import Array, Array32
-from formation_env.numerics.jit import LANES, inline_scalar, tile_function
+from formation_env.numerics.jit import LANES, inline_scalar, tile_function, turns
 
 START_NORMALS: Final = WORK32.process_noise
 
@@ -56,7 +56,7 @@ def clear(state: Array, work: Array) -> None:
 @tile_function
 def begin(state: Array, work32: Array32, given: bool, settings: Array, n: int) -> None:
     """Start an episode in each row."""
-    for k in range(6):
+    for k in range(turns(6, state)):
         for i in range(min(n, LANES)):
             own = scalars(settings, i)
             deviate(state, work32, i, k, given, own.spread_pos if k < 3 else own.spread_vel)

@@ -63,13 +63,13 @@ STAGES: Final = {
     kalman_filter.measure_position: (FILTER, 1),
     kalman_filter.measure_position_and_velocity: (FILTER, 2),
     reward.score: ((FIELDS, FIELDS, TABLE, INT), 2),
-    observe.observe: ((FIELDS, FIELDS, FIELDS32, INT), 13),
-    start.begin: ((FIELDS, FIELDS32, BOOL, TABLE, INT), 13),
-    memory.write_results: ((FIELDS, FIELDS, TABLE, FLAGS, INTEGERS, INT, INT), 27),
+    observe.observe: ((FIELDS, FIELDS, FIELDS32, INT), 8),
+    start.begin: ((FIELDS, FIELDS32, BOOL, TABLE, INT), 5),
+    memory.write_results: ((FIELDS, FIELDS, TABLE, FLAGS, INTEGERS, INT, INT), 8),
 }
 """Each stage that loops over the rows of a tile: its signature, and how many of its loops are vectorised with AVX2.
 
-Loops of the functions that a stage calls are its own. LLVM unrolls most loops over fields first, so the loop over rows
+Loops of the functions that a stage calls are its own. LLVM unrolls many loops over fields first, so the loop over rows
 inside counts once for each field.
 """
 OVER_ROWS: Final = "range(min(n, LANES))"
