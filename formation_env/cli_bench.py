@@ -9,6 +9,7 @@ import typer
 
 from formation_env.cli_errors import FAILED, Interrupted
 from formation_env.cli_options import Envs, Seed
+from formation_env.cli_policies import make_policy
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,6 +20,11 @@ MAX_ROWS: Final = 1_000_000
 MAX_STEPS: Final = 1e12
 LINE_INTERVAL_S: Final = 10.0
 """Time between two lines of progress on stderr."""
+
+DETAILED: Final = "FormationKeeping-v0"
+"""Environment that is looked at in detail unless others are named."""
+POLICY: Final = "lqr"
+"""Policy whose evaluation is timed."""
 
 Rows = Annotated[int, typer.Option(min=1, max=MAX_ROWS, help="Rows of the batched environment.")]
 
@@ -34,7 +40,7 @@ def bench(
 ) -> None:
     """Measure steps per second next to Gymnasium's own environments; time by stage, time and memory per row.
 
-    All environments are in the table of steps per second; the first one's rows are looked at in detail.
+    All environments are in the table of steps per second; the first one's, or else Keeping's, are looked at in detail.
     """
     from formation_env.evaluation import bench as benchmark
     from formation_env.files import check_writable
@@ -48,15 +54,31 @@ def bench(
         if plot.suffix.lower() != ".png":
             raise ConfigError(f"--plot: must end in .png, got {plot}")
         check_writable(plot.parent)
-    for name, seconds in benchmark.startup().items():
-        typer.echo(f"{name:20s} {seconds:6.2f} s")
+    detailed = envs[0] if envs else DETAILED
+    for heading, is_cached in (("new process", True), ("new process, nothing compiled before", False)):
+        times = ", ".join(f"{name} {seconds:.2f} s" for name, seconds in benchmark.startup(is_cached).items())
+        typer.echo(f"{heading}: {times}")
+    _print_ratios(detailed)
     _print_rates(benchmark.table(rows, chosen))
     if rivals:
-        others, left_out = benchmark.beside_rivals(chosen[0])
+        others, left_out = benchmark.beside_rivals(detailed)
         typer.echo("\n".join(left_out))
         if len(others):
             _print_rates(others)
-    _print_row(chosen[0], rows, max_rows, plot)
+    _print_row(detailed, rows, max_rows, plot)
+
+
+def _print_ratios(env: str) -> None:
+    """Print how fast an environment steps in the situations that matter, each line as it is measured."""
+    from formation_env.evaluation.bench_ratios import ratios
+    from formation_env.task.loading import load_scenario
+
+    scenario = load_scenario(env)
+    policy = make_policy(POLICY, scenario)
+    assert policy is not None
+    typer.echo(f"{'':44s} {'ns':>8s}  {'ratio':>5s}  to")
+    for each in ratios(env, policy, scenario):
+        typer.echo(f"{each.case:44s} {each.ns_per_step:8.1f}  {each.ratio:5.2f}  {each.reference}")
 
 
 def _print_rates(rates: "pd.DataFrame") -> None:

@@ -1,6 +1,5 @@
 """The commands of `formation-env env`. What they need is imported when they run."""
 
-import importlib.metadata
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Final
@@ -11,9 +10,9 @@ from formation_env import cli_bench
 from formation_env.cli_errors import DISTRIBUTION, WRONG_INPUT
 from formation_env.cli_group import Group, make_app
 from formation_env.cli_options import Env, Seed
+from formation_env.cli_policies import make_policy
 
 if TYPE_CHECKING:
-    from formation_env.evaluation.rollout import Policy
     from formation_env.task.scenario import Scenario
 
 COMMANDS: Final = (
@@ -33,8 +32,6 @@ FORMER_COMMANDS: Final = {
     "check": f"{DISTRIBUTION} env validate",
     "observation": f"{DISTRIBUTION} env show-observation",
 }
-POLICIES: Final = "formation_env.policies"
-"""Entry points of other packages: functions that make a policy from its name and a scenario."""
 
 
 class EnvGroup(Group):
@@ -179,25 +176,8 @@ def render(
     check_writable(out.parent)
     if steps > scenario.num_steps:
         typer.echo(f"note: --steps: the episode has {scenario.num_steps} steps; the picture shows its end", err=True)
-    save_frame(out, scenario, min(steps, scenario.num_steps), seed, _make_policy(policy, scenario))
+    save_frame(out, scenario, min(steps, scenario.num_steps), seed, make_policy(policy, scenario))
     typer.echo(out)
-
-
-def _make_policy(name: str | None, scenario: "Scenario") -> "Policy | None":
-    """A policy by name, made by a package that offers policies.
-
-    Raises:
-        ConfigError: no installed package offers policies, or none of that name.
-    """
-    from formation_env.settings import ConfigError
-
-    if name is None:
-        return None
-    makers = list(importlib.metadata.entry_points(group=POLICIES))
-    if not makers:
-        raise ConfigError(f"--policy: no installed package offers policies; install {DISTRIBUTION} again")
-    made: Policy = makers[0].load()(name, scenario)
-    return made
 
 
 app.command(epilog=f"Example: {DISTRIBUTION} env bench keeping --rows 1024 --plot keeping.png")(cli_bench.bench)

@@ -34,7 +34,7 @@ LAYERS = {
         {"rendering"},
         {"envs"},
         {"evaluation"},
-        {"", "__main__", "cli", "cli_bench", "cli_env", "cli_errors", "cli_group", "cli_options"},
+        {"", "__main__", "cli", "cli_bench", "cli_env", "cli_errors", "cli_group", "cli_options", "cli_policies"},
     ),
     "baselines": (
         {"design", "result_cache"},

@@ -1,8 +1,10 @@
 """Throughput of the environments, relative to Gymnasium's own environments measured in the same run."""
 
 import itertools
+import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, Final
@@ -27,7 +29,11 @@ _ACTIONS: Final = 64
 """Random actions drawn beforehand, so that sampling does not count."""
 
 
-def single_stepper(env: str, steps: int) -> Callable[[], int]:
+Stepper = Callable[[], int]
+"""Steps an environment, and returns the number of steps of all its rows."""
+
+
+def single_stepper(env: str, steps: int) -> Stepper:
     """A function that steps one environment made with `gymnasium.make`, and returns the number of steps.
 
     Args:
@@ -50,21 +56,32 @@ def single_stepper(env: str, steps: int) -> Callable[[], int]:
     return run
 
 
-def batch_stepper(env: str, rows: int, steps: int) -> Callable[[], int]:
+def batch_stepper(
+    env: str, rows: int, steps: int, thrust: float = 1.0, num_threads: int | None = None, begins: bool = False
+) -> Stepper:
     """A function that steps a batched environment, and returns the number of steps of all rows.
 
     Args:
         env: as of `single_stepper`.
         rows: rows of the batch.
         steps: steps per call.
+        thrust: greatest random action, of ours.
+        num_threads: threads of ours; None: a number that suits the rows.
+        begins: whether each call begins with a reset of all rows.
     """
     env_id, arguments = _made_of(env)
+    is_ours = env_id in ENV_IDS
+    if is_ours:
+        arguments["num_threads"] = num_threads
     made = gymnasium.make_vec(env_id, rows, vectorization_mode="vector_entry_point", **arguments)
     made.reset(seed=0)
     made.action_space.seed(0)
-    actions = itertools.cycle([made.action_space.sample() for _ in range(min(_ACTIONS, steps))])
+    samples = [made.action_space.sample() for _ in range(min(_ACTIONS, steps))]
+    actions = itertools.cycle([thrust * sample for sample in samples] if is_ours and thrust < 1.0 else samples)
 
     def run() -> int:
+        if begins:
+            made.reset()
         for action in itertools.islice(actions, steps):
             made.step(action)
         return steps * rows
@@ -77,7 +94,7 @@ def _made_of(env: str) -> tuple[str, dict[str, Any]]:
     return (env, {}) if env in gymnasium.registry else (next(iter(ENV_IDS)), {"scenario": env})
 
 
-def rates(steppers: dict[str, Callable[[], int]], rounds: int = _ROUNDS) -> dict[str, float]:
+def rates(steppers: dict[str, Stepper], rounds: int = _ROUNDS) -> dict[str, float]:
     """Steps per second of each stepper: the best of some rounds in which all take turns, since clock rates vary."""
     best = dict.fromkeys(steppers, 0.0)
     for _ in range(rounds):
@@ -88,15 +105,22 @@ def rates(steppers: dict[str, Callable[[], int]], rounds: int = _ROUNDS) -> dict
     return best
 
 
-def startup() -> dict[str, float]:
-    """Seconds that a new process takes to import the package and to fly its first steps (compiled code is cached)."""
+def startup(is_cached: bool = True) -> dict[str, float]:
+    """Seconds that a new process takes to import the package and to fly its first steps.
+
+    Args:
+        is_cached: whether it finds compiled code in the cache, or compiles everything.
+    """
     code = (
         "import time; a = time.perf_counter(); import formation_env; b = time.perf_counter();"
         "e = formation_env.FormationEnv(); e.reset(seed=0); e.step([0, 0, 0]); c = time.perf_counter();"
         "v = formation_env.FormationVectorEnv(64); v.reset(seed=0); v.step(v.action_space.sample());"
         "print(b - a, c - b, time.perf_counter() - c)"
     )
-    output = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    with tempfile.TemporaryDirectory() as empty:
+        environment = os.environ if is_cached else {**os.environ, "NUMBA_CACHE_DIR": empty}
+        command = [sys.executable, "-c", code]
+        output = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
     return dict(zip(("import", "first single step", "first batched step"), map(float, output.split()), strict=True))
 
 

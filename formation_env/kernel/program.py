@@ -169,10 +169,13 @@ def _step(kinds: Kinds, sources: str) -> Any:
     ) -> int:
         """Fly rows over one step; the arguments are those of `Program`."""
         work, work32, own = new_scratch(schedule, varied)
+        large = memory.is_large(states, results)
         ended, known_line = 0, -1
         for index in range(first, last):
             state, row = states[index], index * LANES
             n = min(LANES, len(actions) - row)
+            if large:
+                memory.read_state(state)
             plan.advance(state, n)
             if varied:
                 variants.read_settings(state, packed, own, n)
@@ -195,7 +198,7 @@ def _step(kinds: Kinds, sources: str) -> Any:
             reward.score(state, work, numbers, n)
             observe.observe(state, work, work32, n)
             memory.write_observations(work32, observations, row, n)
-            ended += memory.write_results(state, work, results, flags, integers, row, n)
+            ended += memory.write_results(state, work, results, flags, integers, row, n, large)
         return ended
 
     return step

@@ -10,7 +10,8 @@ from formation_env.kernel.tile import Flags, Integers, Noises, Results
 
 NO_NOISES: Final = np.empty((0, 0))
 _PADDING: Final = 8
-"""Columns behind the rows, so that the fields of a block do not fall on the same lines of the processor's cache."""
+"""Least columns behind the rows, so that the fields of a block do not fall on the same lines of the processor's cache,
+and a number of which all columns are a multiple, so that each field begins a line."""
 _BLOCKS: Final[tuple[tuple[Any, Any], ...]] = (
     (Results(), np.float64),
     (Flags(), np.bool_),
@@ -42,7 +43,7 @@ def block_shapes(num_rows: int, with_noises: bool) -> tuple[Shape, ...]:
         num_rows: rows; each block is (fields, num_rows) or somewhat wider.
         with_noises: whether the step's noises are asked for.
     """
-    pitch = num_rows + _PADDING if num_rows > 1 else 1
+    pitch = (num_rows + 2 * _PADDING - 1) // _PADDING * _PADDING if num_rows > 1 else 1
     kept = _BLOCKS if with_noises else _BLOCKS[:-1]
     return tuple(((sum(sizes), pitch), dtype) for sizes, dtype in kept)
 

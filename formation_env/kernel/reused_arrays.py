@@ -6,11 +6,16 @@ by page, cleared.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from math import prod
+from operator import le
 from sys import getrefcount
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+
+from formation_env.numerics.streaming import LINE_BYTES
 
 Arrays = tuple[NDArray[Any], ...]
 Shape = tuple[tuple[int, ...], type]
@@ -20,12 +25,20 @@ LEAST_BYTES: Final = 1 << 17
 MOST_KEPT: Final = 4
 
 
-def _held(arrays: Arrays) -> int:
-    """The most references that any of some arrays has; views count, since each holds the array that owns its memory."""
-    return max(map(getrefcount, arrays))
+def _new(make: Callable[..., NDArray[Any]], shape: tuple[int, ...], dtype: type) -> NDArray[Any]:
+    """A new array that begins at a multiple of LINE_BYTES."""
+    size = prod(shape)
+    owner = make(size + LINE_BYTES // np.dtype(dtype).itemsize, dtype)
+    first = -owner.ctypes.data % LINE_BYTES // owner.itemsize
+    return owner[first : first + size].reshape(shape)
 
 
-_HELD_BY_NOBODY: Final = _held((np.empty(1),))
+def _held(arrays: Arrays) -> tuple[int, int]:
+    """The most references that any of some arrays has, and any owner of their memory, which each view of it holds."""
+    return max(map(getrefcount, arrays)), max([getrefcount(array.base) for array in arrays])
+
+
+_HELD_BY_NOBODY: Final = _held((_new(np.empty, (1,), float),))
 _NO_ROWS: Final = np.empty(0, np.intp)
 
 
@@ -53,9 +66,10 @@ class ReusedArrays:
 
     def _take(self) -> _Kept:
         for kept in self._kept:
-            if _held(kept.arrays) <= _HELD_BY_NOBODY:
+            if all(map(le, _held(kept.arrays), _HELD_BY_NOBODY)):
                 return kept
-        made = _Kept(tuple([self._make(shape, dtype) for shape, dtype in self._shapes]), _NO_ROWS)
+        make = partial(_new, self._make) if self._is_kept else self._make
+        made = _Kept(tuple([make(shape, dtype) for shape, dtype in self._shapes]), _NO_ROWS)
         if self._is_kept:
             self._kept = [made, *self._kept[: MOST_KEPT - 1]]
         return made

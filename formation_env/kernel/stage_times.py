@@ -164,6 +164,6 @@ def _calls(kinds: Kinds) -> dict[str, _Call]:
         a.work32, a.observations, row, n
     )
     calls["memory.write_results"] = lambda a, state, stream, row, n: memory.write_results(
-        state, a.work, a.results, a.flags, a.integers, row, n
+        state, a.work, a.results, a.flags, a.integers, row, n, memory.is_large(a.states, a.results)
     )
     return calls

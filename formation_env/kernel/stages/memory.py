@@ -15,6 +15,7 @@ from formation_env.kernel.tile import (
     RESULTS,
     SHOWN,
     STATE,
+    STATE_SIZE,
     WORK,
     WORK32,
     State,
@@ -23,12 +24,16 @@ from formation_env.kernel.tile import (
 )
 from formation_env.numerics.arrays import Array, Array32
 from formation_env.numerics.jit import LANES, tile_function, turns
+from formation_env.numerics.streaming import LINE_BYTES, read_ahead, write_line
 from formation_env.numerics.transpose import BLOCK, transpose_block
 from formation_env.task.observation import SIZE
 
 Flags = NDArray[np.bool_]
 Integers = NDArray[np.int64]
 
+LARGE_TILES: Final = 256
+"""Tiles from which on the memory of a step is larger than the cache that a processor core has for itself."""
+LINE_NUMBERS: Final = LINE_BYTES // 8
 NUM_STATE: Final = sum(State())
 PHASE: Final = plan("phase")
 MEASURED, TERMINATED, TRUNCATED = FLAGS
@@ -53,18 +58,44 @@ def write_observations(work32: Array32, observations: Array32, first: int, n: in
 
 
 @tile_function
+def is_large(states: Array, results: Array) -> bool:
+    """Whether the rows are so many that their memory is read and written in sweeps, see `streaming`."""
+    return len(states) >= LARGE_TILES and results.ctypes.data % LINE_BYTES == 0 and results.shape[1] % LINE_NUMBERS == 0
+
+
+@tile_function
+def read_state(state: Array) -> None:
+    """Bring a tile's state into the cache in one sweep; the stages touch it in an order that no processor foresees."""
+    for k in range(0, STATE_SIZE, LINE_NUMBERS):
+        read_ahead(state, k)
+
+
+@tile_function
+def stream_fields(tile: Array, offset: int, size: int, block: Array, place: int, first: int) -> None:
+    """Copy consecutive fields of a whole tile into the columns of a block from `first` on, past the cache."""
+    flat, pitch = block.reshape(-1), block.shape[1]
+    for k in range(turns(size, tile)):
+        for i in range(0, LANES, LINE_NUMBERS):
+            write_line(tile, offset + k * LANES + i, flat, (place + k) * pitch + first + i)
+
+
+@tile_function
 def write_results(
-    state: Array, work: Array, results: Array, flags: Flags, integers: Integers, first: int, n: int
+    state: Array, work: Array, results: Array, flags: Flags, integers: Integers, first: int, n: int, large: bool
 ) -> int:
     """Write a tile's results in the columns from `first` on; return how many episodes ended."""
-    for k in range(turns(FROM_STATE, state)):
-        line = results[k, first:]  # from here on, so that the compiler sees that no index is negative
-        for i in range(min(n, LANES)):
-            line[i] = state[STATE.true_state + k * LANES + i]
-    for k in range(turns(FROM_WORK, work)):
-        line = results[FROM_STATE + k, first:]
-        for i in range(min(n, LANES)):
-            line[i] = work[WORK.thrust + k * LANES + i]
+    if large and n == LANES:
+        stream_fields(state, STATE.true_state, FROM_STATE, results, 0, first)
+        stream_fields(work, WORK.thrust, FROM_WORK, results, FROM_STATE, first)
+    else:
+        for k in range(turns(FROM_STATE, state)):
+            line = results[k, first:]  # from here on, so that the compiler sees that no index is negative
+            for i in range(min(n, LANES)):
+                line[i] = state[STATE.true_state + k * LANES + i]
+        for k in range(turns(FROM_WORK, work)):
+            line = results[FROM_STATE + k, first:]
+            for i in range(min(n, LANES)):
+                line[i] = work[WORK.thrust + k * LANES + i]
     measured, terminated, truncated = flags[MEASURED, first:], flags[TERMINATED, first:], flags[TRUNCATED, first:]
     phase, variant = integers[INTEGERS.phase, first:], integers[INTEGERS.variant, first:]
     for i in range(min(n, LANES)):

@@ -17,8 +17,10 @@ from formation_env.dynamics import NONLINEAR
 from formation_env.kernel import packing, program, tile
 from formation_env.kernel import settings as line
 from formation_env.kernel.simulation import Simulation
+from formation_env.kernel.stages.memory import LARGE_TILES
 from formation_env.navigation.filter_settings import KalmanFilter
 from formation_env.numerics.jit import LANES
+from formation_env.numerics.streaming import LINE_BYTES
 from formation_env.task.observation import SIZE
 
 PACKAGE = Path(formation_env.__file__).parent
@@ -262,3 +264,22 @@ def test_reading_the_noises_changes_no_flight() -> None:
         assert all(np.isfinite(value).all() for value in noises.values())
         predicted = noises["measurement"] - noises["innovation"]
         assert 0 < np.abs(predicted - before)[:, :3].max() < 1e3
+
+
+def test_a_large_batch_flies_as_a_small_one() -> None:
+    """Batches beyond the cache are written in another way, their last tile as small ones are: the same bits."""
+    tiles = LARGE_TILES + 1
+    large, small = FormationVectorEnv(tiles * LANES - 27, num_threads=1), FormationVectorEnv(70)
+    first = large.num_envs - small.num_envs
+    for env, start in ((large, 0), (small, first)):
+        env.reset(seed=start)
+    actions = random_actions(1, 3, small.num_envs)
+    for action in actions:
+        wide = np.zeros((large.num_envs, 3), np.float32)
+        wide[first:] = action
+        one, other = large.step(wide), small.step(action)
+        assert large.simulation.results.blocks[0].ctypes.data % LINE_BYTES == 0  # else it is written as others are
+        for mine, its in zip(one[:4], other[:4], strict=True):
+            np.testing.assert_array_equal(mine[first:], its)
+        for name, value in other[4].items():
+            np.testing.assert_array_equal(one[4][name][first:], value, err_msg=name)

@@ -65,7 +65,7 @@ STAGES: Final = {
     reward.score: ((FIELDS, FIELDS, TABLE, INT), 2),
     observe.observe: ((FIELDS, FIELDS, FIELDS32, INT), 8),
     start.begin: ((FIELDS, FIELDS32, BOOL, TABLE, INT), 5),
-    memory.write_results: ((FIELDS, FIELDS, TABLE, FLAGS, INTEGERS, INT, INT), 8),
+    memory.write_results: ((FIELDS, FIELDS, TABLE, FLAGS, INTEGERS, INT, INT, BOOL), 8),
 }
 """Each stage that loops over the rows of a tile: its signature, and how many of its loops are vectorised with AVX2.
 
