@@ -10,7 +10,7 @@ from formation_env.task.loading import load_scenario
 
 
 def test_stages_are_those_of_the_step_in_its_order() -> None:
-    """A stage that is added to the program, or moves in it, must be timed there; some are for large batches and analysis."""
+    """A stage that is added to the program, or moves in it, must be timed there, but for those that few ask for."""
     source = inspect.getsource(program._step).partition('"""Fly rows')[2]
     calls = re.findall(r"^ +(?:\w+ \+?= )?(?:\w+\.)?(\w+)\((?:state|streams|actions|work\d*)\b", source, re.MULTILINE)
     steps = [name for name in calls if name not in ("read_state", "innovate", "write_noises")]
