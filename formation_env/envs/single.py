@@ -65,6 +65,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.observation_space = interface.observation_space()
         self.simulation = Simulation(self.scenario, 1, with_noises=analysis)
         self._observations = self.simulation.new_observations()
+        self._arguments = self.simulation.arguments(self._observations)
         self._analysis = analysis
         self._varied = self.scenario.domain_randomization is not None
         self._keyed = False
@@ -130,7 +131,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             raise gymnasium.error.ResetNeeded("step: call reset first")
         simulation = self.simulation
         simulation.actions[0] = action
-        simulation.step_in_place(self._observations)
+        simulation.fly(self._arguments)
         info, reward, terminated, truncated = self._read_results()
         if terminated or truncated:
             info[info_keys.TOTALS] = {name: float(value[0]) for name, value in episode_metrics(simulation).items()}

@@ -111,22 +111,17 @@ class Simulation:
         """
         del self.results  # so that its blocks are written again if nobody else holds them
         self.results = StepResults(self._blocks.take(), self.num_rows)
-        if len(self._parts) == 1:
-            return self.step_in_place(observations)
-        step = program(self._kinds).step
-        arrays, others = self._arrays, (self.actions, observations, *self.results.blocks)
+        parts = [self.arguments(observations, first, last) for first, last in self._parts]
+        return self.fly(parts[0]) if len(parts) == 1 else run_parts(lambda part: self.fly(parts[part]), len(parts))
 
-        def fly(part: int) -> int:
-            ended: int = step(*arrays, *self._parts[part], *others)
-            return ended
+    def arguments(self, observations: Array32, first: int = 0, last: int | None = None) -> tuple[Any, ...]:
+        """Arguments of `fly` for the tiles from first to last - 1: where it writes observations, and results as now."""
+        last = len(self._states) if last is None else last
+        return (*self._arrays, first, last, self.actions, observations, *self.results.blocks)
 
-        return run_parts(fly, len(self._parts))
-
-    def step_in_place(self, observations: Array32) -> int:
-        """Fly all rows over one step like `step`, in this thread, and write `results` where the last ones stand."""
-        blocks, num_tiles = self.results.blocks, len(self._states)
-        step = program(self._kinds).step
-        ended: int = step(*self._arrays, 0, num_tiles, self.actions, observations, *blocks)
+    def fly(self, arguments: tuple[Any, ...]) -> int:
+        """Fly some tiles over one step in this thread; returns how many episodes ended."""
+        ended: int = program(self._kinds).step(*arguments)
         return ended
 
     def forget_ends(self, rows: NDArray[np.intp]) -> None:

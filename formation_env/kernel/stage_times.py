@@ -84,7 +84,8 @@ def stage_times(scenario: Scenario, rows: int, rounds: int = _ROUNDS) -> dict[st
 
     nothing = alone(_nothing)
     times = {name: max(alone(call) - nothing, 0.0) for name, call in _calls(kinds).items()}
-    times[WHOLE] = seconds(lambda count: [simulation.step_in_place(arrays.observations) for _ in range(count)])
+    arguments = simulation.arguments(arrays.observations)
+    times[WHOLE] = seconds(lambda count: [simulation.fly(arguments) for _ in range(count)])
     return {name: taken / (passes * rows) * 1e9 for name, taken in times.items()}
 
 

@@ -110,7 +110,7 @@ def read_plan(
     if others == 0 and line == known_line:
         return known_line
     plans, views = schedule.reshape(-1), seen.reshape(-1)
-    if others == 0:
+    if others == 0 and n > 1:
         broadcast_line(plans, line * columns, columns, work, WORK.plan, n)
         broadcast_line(views, line * NUM_SEEN, NUM_PLANNED, work32, PLANNED, n)
         broadcast_line(views, line * NUM_SEEN + NUM_PLANNED, NUM_SEEN - NUM_PLANNED, work32, WORK32.scales, n)
