@@ -19,7 +19,7 @@ def test_environments_of_equal_kinds_share_a_program() -> None:
     assert tuple(first.origins) == ALL
     assert set(first.origins.values()) <= {COMPILED, FOUND, LOADED}
     assert first.folder is not None
-    assert len(list(first.folder.glob("program._*.nbi"))) >= len(ALL)
+    assert len(list(first.folder.glob("program.*.nbi"))) >= len(ALL)
     assert fill_cache("FormationReconfiguration-v0").origins == dict.fromkeys(ALL, LOADED)
 
 
