@@ -6,13 +6,14 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Final
 
 import gymnasium
 import pandas as pd
 
 from formation_env.evaluation import rivals
+from formation_env.evaluation.rivals import ACTIONS, Stepper
 from formation_env.registration import ENV_IDS
 
 REFERENCE: Final = "CartPole-v1"
@@ -25,12 +26,6 @@ _SINGLE_STEPS: Final = 3000
 _BATCH_STEPS: Final = 400
 _ROUNDS: Final = 5
 _BATCH_ROUNDS: Final = 3
-_ACTIONS: Final = 64
-"""Random actions drawn beforehand, so that sampling does not count."""
-
-
-Stepper = Callable[[], int]
-"""Steps an environment, and returns the number of steps of all its rows."""
 
 
 def single_stepper(env: str, steps: int) -> Stepper:
@@ -44,7 +39,7 @@ def single_stepper(env: str, steps: int) -> Stepper:
     made: gymnasium.Env[Any, Any] = gymnasium.make(env_id, **arguments)
     made.reset(seed=0)
     made.action_space.seed(0)
-    actions = itertools.cycle([made.action_space.sample() for _ in range(_ACTIONS)])
+    actions = itertools.cycle([made.action_space.sample() for _ in range(ACTIONS)])
 
     def run() -> int:
         for action in itertools.islice(actions, steps):
@@ -76,7 +71,7 @@ def batch_stepper(
     made = gymnasium.make_vec(env_id, rows, vectorization_mode="vector_entry_point", **arguments)
     made.reset(seed=0)
     made.action_space.seed(0)
-    samples = [made.action_space.sample() for _ in range(min(_ACTIONS, steps))]
+    samples = [made.action_space.sample() for _ in range(min(ACTIONS, steps))]
     actions = itertools.cycle([thrust * sample for sample in samples] if is_ours and thrust < 1.0 else samples)
 
     def run() -> int:

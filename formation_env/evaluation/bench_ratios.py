@@ -1,12 +1,13 @@
 """The step's speed where it matters, each time beside what it is measured by, stepped in the same run."""
 
-import os
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Final, NamedTuple
 
-from formation_env.evaluation.bench import REFERENCE, Stepper, batch_stepper, rates, single_stepper
+from formation_env.evaluation.bench import REFERENCE, batch_stepper, rates, single_stepper
+from formation_env.evaluation.rivals import Stepper
 from formation_env.evaluation.rollout import Policy, evaluate
+from formation_env.kernel.threads import usable_cpus
 from formation_env.task.scenario import Scenario
 
 ROWS: Final = (1024, 4096, 65_536)
@@ -75,7 +76,7 @@ def ratios(env: str, policy: Policy, scenario: Scenario, rounds: int = _ROUNDS) 
 
 def _cases(env: str, policy: Policy, scenario: Scenario) -> Iterator[Callable[[], Case]]:
     """What makes each case, when its turn has come: large batches shall not all be in memory."""
-    for num_threads in (1, 2) if (os.cpu_count() or 1) > 1 else (1,):
+    for num_threads in (1, 2) if len(usable_cpus()) > 1 else (1,):
         for rows in ROWS:
             yield partial(_from_the_start, env, rows, num_threads)
     yield partial(_in_flight, env, ROWS[1], scenario.num_steps)

@@ -1,7 +1,6 @@
 """Cost of a row of a batched environment: its time against the number of rows, and its memory."""
 
 import math
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
@@ -9,7 +8,7 @@ from typing import Final
 import numpy as np
 import pandas as pd
 
-from formation_env.evaluation.bench import REFERENCE, batch_stepper
+from formation_env.evaluation.bench import REFERENCE, batch_stepper, rates
 from formation_env.files import replacing
 from formation_env.kernel.simulation import Simulation
 from formation_env.task.scenario import Scenario
@@ -41,14 +40,9 @@ def time_per_row(env: str, rows: Sequence[int] = ROWS, row_steps: int = _ROW_STE
     lines = []
     for size in rows:
         steps = min(max(math.ceil(row_steps / size), _FEWEST_STEPS), _MOST_STEPS)
-        steppers = [batch_stepper(name, size, steps) for name in (env, REFERENCE)]
-        best = [math.inf, math.inf]
-        for _ in range(_ROUNDS if size < _LARGE else _ROUNDS_OF_LARGE):
-            for index, run in enumerate(steppers):
-                start = time.perf_counter()
-                done = run()
-                best[index] = min(best[index], (time.perf_counter() - start) / done * 1e9)
-        lines.append((size, *best))
+        steppers = {name: batch_stepper(name, size, steps) for name in (env, REFERENCE)}
+        best = rates(steppers, _ROUNDS if size < _LARGE else _ROUNDS_OF_LARGE)
+        lines.append((size, *(1e9 / rate for rate in best.values())))
     return pd.DataFrame(lines, columns=["rows", "env_ns", "cartpole_ns"])
 
 

@@ -13,7 +13,7 @@ from typing import Any, Final
 
 Stepper = Callable[[], int]
 """Steps a batch and returns the number of environment steps of all rows."""
-_ACTIONS: Final = 64
+ACTIONS: Final = 64
 """Random actions drawn beforehand, so that sampling does not count."""
 
 
@@ -157,7 +157,7 @@ def vbar_stepper(rows: int) -> Stepper:
     env.reset(seed=0)
     env.action_space.seed(0)
     steps = int(env.cfg.max_steps)
-    actions = itertools.cycle([env.action_space.sample() for _ in range(_ACTIONS)])
+    actions = itertools.cycle([env.action_space.sample() for _ in range(ACTIONS)])
 
     def run() -> int:
         for action in itertools.islice(actions, steps):

@@ -142,13 +142,38 @@ def new_scratch(schedule: Array, varied: bool) -> tuple[Array, Array32, Array]:
     return np.empty(width), np.empty(WORK32_SIZE, np.float32), np.empty(settings.SIZE * LANES if varied else 0)
 
 
+class Stages(NamedTuple):
+    """The compiled stages that kinds choose.
+
+    Attributes:
+        thrust, move, predict, sense, measure: see the registries that `Kinds` names.
+        table: place of the leader's table of a true motion that needs one, counted in numbers.
+    """
+
+    thrust: Any
+    move: Any
+    predict: Any
+    sense: Any
+    measure: Any
+    table: int
+
+
+def stages_of(kinds: Kinds) -> Stages:
+    """The stages of some kinds."""
+    return Stages(
+        thrust=thruster.KINDS[kinds.thruster],
+        move=MOTIONS[kinds.truth],
+        predict=kalman_filter.PREDICT[kinds.filter_model],
+        sense=sensor.KINDS[kinds.sensor],
+        measure=kalman_filter.MEASURE[kinds.sensor],
+        table=MODELS + (settings.FILTER_SIZE if kinds.filter_model == packing.VARYING else 0),
+    )
+
+
 # Long: numba takes the arrays one by one, and the order of the stages is best read at one place.
 def _step(kinds: Kinds, sources: str) -> Any:
     """Compile the step."""
-    thrust, move = thruster.KINDS[kinds.thruster], MOTIONS[kinds.truth]
-    predict = kalman_filter.PREDICT[kinds.filter_model]
-    sense, measure = sensor.KINDS[kinds.sensor], kalman_filter.MEASURE[kinds.sensor]
-    table = MODELS + (settings.FILTER_SIZE if kinds.filter_model == packing.VARYING else 0)
+    thrust, move, predict, sense, measure, table = stages_of(kinds)
     varied = kinds.varied
 
     @compiled_program("step", kinds, sources)
@@ -207,7 +232,7 @@ def _step(kinds: Kinds, sources: str) -> Any:
 # Long: see `_step`.
 def _reset(kinds: Kinds, sources: str) -> Any:
     """Compile the reset of some rows."""
-    sense, measure = sensor.KINDS[kinds.sensor], kalman_filter.MEASURE[kinds.sensor]
+    _, _, _, sense, measure, _ = stages_of(kinds)
     varied = kinds.varied
 
     @compiled_program("reset", kinds, sources)

@@ -8,13 +8,12 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_env.kernel import packing, settings, variants
-from formation_env.kernel.program import MOTIONS, Kinds, kinds_of, new_scratch
+from formation_env.kernel import variants
+from formation_env.kernel.program import Kinds, kinds_of, new_scratch, stages_of
 from formation_env.kernel.simulation import Simulation
-from formation_env.kernel.stages import kalman_filter, link, memory, noise, observe, plan, reward, sensor, thruster
+from formation_env.kernel.stages import link, memory, noise, observe, plan, reward
 from formation_env.kernel.stages.memory import Flags, Integers
 from formation_env.kernel.stages.true_motion import push
-from formation_env.kernel.tile import MODELS
 from formation_env.numerics.arrays import Array, Array32
 from formation_env.numerics.jit import LANES
 from formation_env.task.scenario import Scenario
@@ -136,10 +135,7 @@ def _name(stage: Any) -> str:
 # Long: a line or two for each stage, and the order of the stages is best read at one place.
 def _calls(kinds: Kinds) -> dict[str, _Call]:
     """A call of each stage in the order of `program._step`: (arrays, state, stream, row, n), n rows from `row` on."""
-    thrust, move = thruster.KINDS[kinds.thruster], MOTIONS[kinds.truth]
-    predict = kalman_filter.PREDICT[kinds.filter_model]
-    sense, measure = sensor.KINDS[kinds.sensor], kalman_filter.MEASURE[kinds.sensor]
-    table = MODELS + (settings.FILTER_SIZE if kinds.filter_model == packing.VARYING else 0)
+    thrust, move, predict, sense, measure, table = stages_of(kinds)
 
     def read_plan(a: _Arrays, state: Array, stream: noise.Stream, row: int, n: int) -> None:
         a.known_line[0] = plan.read_plan(state, a.work, a.work32, a.schedule, a.seen, a.known_line[0], n)

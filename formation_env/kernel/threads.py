@@ -20,7 +20,7 @@ _current_cpu: Any = getattr(ctypes.PyDLL(None), "sched_getcpu", None) if sys.pla
 
 def default_num_threads(num_rows: int) -> int:
     """Number of threads for a batch: one per `ROWS_PER_THREAD` rows, but at most the CPUs that this process may use."""
-    return max(1, min(num_rows // ROWS_PER_THREAD, len(_usable_cpus())))
+    return max(1, min(num_rows // ROWS_PER_THREAD, len(usable_cpus())))
 
 
 def check_num_threads(num_threads: Any, num_rows: int) -> int:
@@ -143,7 +143,7 @@ class _Pool:
 
     def hand_over(self, parts: list[_Part]) -> None:
         """Give each part to an idle or a new worker; parts without a worker are left to the caller."""
-        cpus = _usable_cpus()
+        cpus = usable_cpus()
         here = _current_cpu() if _current_cpu is not None and len(cpus) > 1 else None
         for part in parts:
             if not self.idle and len(self.workers) >= max(len(cpus), len(parts)):
@@ -164,7 +164,7 @@ class _Pool:
         return worker
 
 
-def _usable_cpus() -> list[int]:
+def usable_cpus() -> list[int]:
     """Numbers of the CPUs that the calling thread may use."""
     return sorted(os.sched_getaffinity(0)) if sys.platform == "linux" else list(range(os.cpu_count() or 1))
 

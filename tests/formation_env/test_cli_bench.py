@@ -13,7 +13,7 @@ from cli_helpers import environment, write_metadata
 from typer.testing import CliRunner, Result
 
 from formation_env.cli import app
-from formation_env.evaluation import bench, soak
+from formation_env.evaluation import bench, bench_ratios, soak
 from formation_env.evaluation.soak import Reading
 from formation_env.kernel import stage_times
 
@@ -27,12 +27,17 @@ def test_bench_prints_stages_memory_and_rows(monkeypatch: pytest.MonkeyPatch, tm
     """All four tables of a small batch, and the plot in a folder that it makes."""
     for name, number in {"_SINGLE_STEPS": 2, "_BATCH_STEPS": 2, "_ROUNDS": 1, "_BATCH_ROUNDS": 1}.items():
         monkeypatch.setattr(bench, name, number)
+    small = {"ROWS": (2, 3, 4), "_STEPS": 2, "_ROW_STEPS": 600, "_SINGLE_STEPS": 2, "_EPISODES": 2}
+    for name, value in small.items():
+        monkeypatch.setattr(bench_ratios, name, value)
+    monkeypatch.setattr(bench, "startup", lambda is_cached: {"import": 0.5})  # it compiles everything
     times = {"noise.draw": 5.0, stage_times.WHOLE: 50.0}
     monkeypatch.setattr(stage_times, "stage_times", lambda scenario, rows: times)  # it compiles each stage
     path = tmp_path / "new" / "rows.png"
     result = run("bench", "keeping", "--rows", "2", "--max-rows", "16", "--plot", path)
     assert result.exit_code == 0, result.output
     shown = ("x_cartpole", "ns_per_row", "noise.draw", "whole step", "bytes_per_row", "observations", "cartpole_ns")
+    shown += ("import 0.50 s", "small thrust, 1 thread", "full thrust", "nonlinear truth", "the bare step")
     assert [text for text in shown if text not in result.stdout] == []
     assert result.stdout.splitlines()[-2].split()[0] == "16"
     assert path.read_bytes().startswith(b"\x89PNG")

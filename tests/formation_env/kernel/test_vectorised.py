@@ -3,8 +3,10 @@
 This file, run as a program, compiles every stage and lets LLVM write its remarks to stderr; the tests read them.
 """
 
+import importlib
 import inspect
 import os
+import pkgutil
 import re
 import subprocess
 import sys
@@ -18,6 +20,7 @@ import numba
 import pytest
 from numba import types
 
+from formation_env.kernel import stages
 from formation_env.kernel.stages import (
     kalman_filter,
     link,
@@ -73,20 +76,9 @@ Loops of the functions that a stage calls are its own. LLVM unrolls many loops o
 inside counts once for each field.
 """
 OVER_ROWS: Final = "range(min(n, LANES))"
-MODULES: Final = (
-    kalman_filter,
-    link,
-    memory,
-    noise,
-    nonlinear_motion,
-    observe,
-    plan,
-    reward,
-    sensor,
-    start,
-    thruster,
-    true_motion,
-)
+MODULES: Final = [
+    importlib.import_module(f"{stages.__name__}.{module.name}") for module in pkgutil.iter_modules(stages.__path__)
+]
 
 
 def probe(numbers: Any) -> None:
