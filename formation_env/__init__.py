@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from formation_env.lazy import lazy_names
-from formation_env.registration import ENV_IDS, register_all
+from formation_env.registration import ENV_IDS, SWARM_IDS, register_all
 
 if TYPE_CHECKING:
     from formation_env.dynamics.propagation import propagate
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from formation_env.envs import FormationEnv, FormationVectorEnv
     from formation_env.orbital.orbit import Orbit
     from formation_env.settings import ConfigError
-    from formation_env.task.loading import load_scenario, scenario_names
+    from formation_env.task.loading import load_scenario, scenario_names, swarm_names
     from formation_env.task.scenario import Scenario
 
 __version__ = "0.1.0"
@@ -30,11 +30,13 @@ __getattr__ = lazy_names(
         "load_scenario": "formation_env.task.loading",
         "propagate": "formation_env.dynamics.propagation",
         "scenario_names": "formation_env.task.loading",
+        "swarm_names": "formation_env.task.loading",
     },
 )
 
 __all__ = [
     "ENV_IDS",
+    "SWARM_IDS",
     "ConfigError",
     "FormationEnv",
     "FormationVectorEnv",
@@ -44,4 +46,5 @@ __all__ = [
     "load_scenario",
     "propagate",
     "scenario_names",
+    "swarm_names",
 ]

@@ -47,10 +47,10 @@ app = make_app("Scenarios and environments: list, describe, validate, render and
 @app.command("list", epilog=f"Example: {DISTRIBUTION} env list")
 def list_scenarios() -> None:
     """List the scenarios of the package: name, registered id if there is one, title."""
-    from formation_env.task.loading import ENV_IDS, load_scenario, scenario_names
+    from formation_env.task.loading import ENV_IDS, SWARM_IDS, load_scenario, scenario_names, swarm_names
 
-    ids = {name: env_id for env_id, name in ENV_IDS.items()}
-    for name in scenario_names():
+    ids = {name: env_id for env_id, name in (ENV_IDS | SWARM_IDS).items()}
+    for name in (*scenario_names(), *swarm_names()):
         typer.echo(f"{name:26s} {ids.get(name, ''):28s} {load_scenario(name).title}")
 
 

@@ -10,7 +10,13 @@ ENV_IDS: Final = {
     "FormationReconfiguration-v0": "reconfiguration",
     "FormationMission-v0": "mission",
 }
-"""Registered ids and their scenarios."""
+"""Registered ids and their scenarios, of one follower."""
+
+SWARM_IDS: Final = {
+    "FormationSwarm-v0": "swarm",
+    "FormationSwap-v0": "swap",
+}
+"""Registered ids and their scenarios, of several followers."""
 
 
 def register_all() -> None:
@@ -19,11 +25,14 @@ def register_all() -> None:
     The specs state no `max_episode_steps`, or Gymnasium would cut `make(id, scenario=...)` at the length of the id's
     own scenario; `env.spec.max_episode_steps` of an environment made is the length of its plan.
     """
-    for env_id, scenario in ENV_IDS.items():
-        if env_id not in gymnasium.registry:
-            gymnasium.register(
-                id=env_id,
-                entry_point="formation_env.envs.single:FormationEnv",
-                vector_entry_point="formation_env.envs.vector:FormationVectorEnv",
-                kwargs={"scenario": scenario},
-            )
+    single = ("formation_env.envs.single:FormationEnv", "formation_env.envs.vector:FormationVectorEnv")
+    swarm = ("formation_env.envs.swarm:FormationSwarmEnv", "formation_env.envs.swarm_vector:FormationSwarmVectorEnv")
+    for ids, (entry_point, vector_entry_point) in ((ENV_IDS, single), (SWARM_IDS, swarm)):
+        for env_id, scenario in ids.items():
+            if env_id not in gymnasium.registry:
+                gymnasium.register(
+                    id=env_id,
+                    entry_point=entry_point,
+                    vector_entry_point=vector_entry_point,
+                    kwargs={"scenario": scenario},
+                )

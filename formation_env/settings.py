@@ -114,15 +114,25 @@ def _make_settings(cls: type[T], renamed: Mapping[str, str]) -> type[T]:
     return cast(type[T], made)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)  # equal by identity, so that `OneOf | None` can hash it
 class OneOf:
     """Annotation of a field that holds an instance of the annotated class.
 
     A mapping becomes an instance of the registry's class that its `kind` key names; the registry is read at each
     validation, so that classes may be registered later. A hashable instance passes as it is, registered or not.
+
+    Attributes:
+        registry: kind -> class.
+        but: a kind that is not allowed here.
     """
 
     registry: Mapping[str, type]
+    but: str = ""
+
+    @property
+    def _allowed(self) -> dict[str, type]:
+        """The kinds that are allowed."""
+        return {kind: cls for kind, cls in self.registry.items() if kind != self.but}
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """Build the schema that pydantic validates against."""
@@ -130,24 +140,24 @@ class OneOf:
 
     def __get_pydantic_json_schema__(self, _: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Describe the registry's classes of this moment."""
-        choices = {kind: cls.__pydantic_core_schema__ for kind, cls in self.registry.items()}  # type: ignore[attr-defined]
+        choices = {kind: cls.__pydantic_core_schema__ for kind, cls in self._allowed.items()}  # type: ignore[attr-defined]
         return handler(core_schema.tagged_union_schema(choices, discriminator="kind"))
 
     def _validate(self, base: Any, data: Any) -> Any:
         """Make an instance of `base` out of a mapping with a known `kind`, or pass one."""
-        if isinstance(data, base):
+        if isinstance(data, base) and not (self.but and getattr(data, "kind", "") == self.but):
             if type(data).__hash__ is None:
                 raise PydanticCustomError("unhashable", "must be hashable, such as an instance made with @settings")
             return data
-        known = ", ".join(sorted(self.registry))
+        known = ", ".join(sorted(self._allowed))
         if not isinstance(data, Mapping):
             raise PydanticCustomError("mapping_type", "must be a mapping with a kind ({known})", {"known": known})
         if "kind" not in data:
             raise PydanticCustomError("missing_kind", "missing; known: {known}", {"key": "kind", "known": known})
         kind = data["kind"]
-        if isinstance(kind, str) and kind in self.registry:
+        if isinstance(kind, str) and kind in self._allowed:
             return pydantic.TypeAdapter(self.registry[kind]).validate_python(data)
-        context = {"key": "kind", "kind": shortened(kind), "hint": nearest(str(kind)[:80], self.registry)}
+        context = {"key": "kind", "kind": shortened(kind), "hint": nearest(str(kind)[:80], self._allowed)}
         raise PydanticCustomError("unknown_kind", "unknown kind {kind}; {hint}", context)
 
 

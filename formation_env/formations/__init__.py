@@ -5,16 +5,18 @@ To add one: a file with a `Formation` subclass and a line here, or `register_for
 
 from typing import Annotated, TypeVar
 
-from formation_env.formations.base import Formation
+from formation_env.formations.base import FORMATIONS, Formation
 from formation_env.formations.ellipses import ProjectedCircle, SpaceCircle, XYEllipse
 from formation_env.formations.in_track import InTrack
 from formation_env.formations.leader import AtLeader
 from formation_env.formations.lines import Following, Parallel
+from formation_env.formations.listed import Listed
+from formation_env.formations.train import Train
 from formation_env.settings import OneOf, register
 
 F = TypeVar("F", bound=Formation)
 
-FORMATIONS: dict[str, type[Formation]] = {
+_KINDS: dict[str, type[Formation]] = {
     "at_leader": AtLeader,
     "following": Following,
     "parallel": Parallel,
@@ -22,7 +24,10 @@ FORMATIONS: dict[str, type[Formation]] = {
     "in_track": InTrack,
     "space_circle": SpaceCircle,
     "projected_circle": ProjectedCircle,
+    "train": Train,
+    "list": Listed,
 }
+FORMATIONS.update(_KINDS)
 
 AnyFormation = Annotated[Formation, OneOf(FORMATIONS)]
 
@@ -47,9 +52,11 @@ __all__ = [
     "Following",
     "Formation",
     "InTrack",
+    "Listed",
     "Parallel",
     "ProjectedCircle",
     "SpaceCircle",
+    "Train",
     "XYEllipse",
     "register_formation",
 ]

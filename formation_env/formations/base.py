@@ -11,6 +11,9 @@ from formation_env.numerics.arrays import Array
 from formation_env.orbital.constants import MU_EARTH
 from formation_env.orbital.orbit import Orbit
 
+FORMATIONS: "dict[str, type[Formation]]" = {}
+"""Formations by `kind`, filled in where the package puts them together; see `register_formation`."""
+
 
 class Formation(ABC):
     """A relative orbit, given by its LVLH state at one instant.
@@ -23,6 +26,19 @@ class Formation(ABC):
     @abstractmethod
     def state(self, orbit: Orbit, time_s: float = 0.0) -> Array:
         """LVLH state (6,), m and m/s, at the time at which the formation begins, s (it matters on an ellipse only)."""
+
+    def slots(self, count: int, orbit: Orbit) -> "tuple[Formation, ...]":
+        """The formation of the follower in each of `count` slots.
+
+        Raises:
+            ValueError: the formation has one place only, and there are several followers.
+        """
+        if count > 1:
+            raise ValueError(
+                f"formation {self.kind}: has one place for {count} followers; train, list, and the circles and "
+                "ellipses about the leader have several"
+            )
+        return (self,)
 
     def reference(self, times_s: ArrayLike, orbit: Orbit, begin_s: float = 0.0) -> Array:
         """States (..., 6) of the force-free Keplerian path through `state`, before and after the formation begins.

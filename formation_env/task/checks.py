@@ -14,10 +14,13 @@ from formation_env.formations import Formation
 from formation_env.numerics.arrays import Array
 from formation_env.orbital.orbit import Orbit
 from formation_env.settings import nearest
+from formation_env.task.followers import FollowerSettings, Safety
 from formation_env.task.phases import Limits, Phase, Start, whole_steps
 
 MAX_EPISODE_STEPS: Final = 1_000_000
 """Steps of an episode; beyond, even its observations as float32 take 150 MB."""
+SAME_PLACE_M: Final = 1e-3
+"""Slots less than a millimetre apart are the same."""
 MAX_TABLE_BYTES: Final = 2_000_000_000
 """Memory that building a scenario's tables may take: half of a small machine's."""
 LINEAR_BYTES_PER_STEP: Final = 1_400
@@ -77,6 +80,15 @@ def check_spacecraft(follower: Spacecraft, leader: Spacecraft) -> None:
         raise ValueError(f"leader_spacecraft.air_density_kg_m3: must be the follower's, {density:g}, got {leaders:g}")
 
 
+def check_safety(safety: Safety) -> None:
+    """Refuse a collision at a distance that costs nothing."""
+    if safety.collision_distance_m > safety.min_distance_m:
+        raise ValueError(
+            f"safety.collision_distance_m: must not be above min_distance_m = {safety.min_distance_m:g} m, "
+            f"got {safety.collision_distance_m:g} m"
+        )
+
+
 def check_durations(phases: Sequence[Phase], orbit: Orbit, dt_s: float) -> None:
     """Refuse too many steps, and phases shorter than a step."""
     if not phases:
@@ -116,6 +128,62 @@ def check_start(start: Start, phases: Sequence[Phase], limits: Limits, orbit: Or
                 f"reference, beyond limits.max_distance_m = {limits.max_distance_m:g} m"
             )
         place, start_s = phase.formation.reference(end_s, orbit, arrival_s)[:3], end_s
+
+
+def check_followers(count: int, own: Sequence[FollowerSettings], neighbours: int | None, is_randomized: bool) -> None:
+    """Refuse settings that do not fit the number of followers."""
+    if own and len(own) != count:
+        raise ValueError(f"follower_settings: must have {count}, one for each follower, or none, got {len(own)}")
+    if neighbours is not None and neighbours >= count:
+        raise ValueError(f"neighbours: each of {count} followers has {count - 1}, got {neighbours}")
+    if is_randomized:
+        raise ValueError(f"domain_randomization: is for a single follower, got followers = {count}")
+
+
+def check_slots(start: Start, phases: Sequence[Phase], count: int, safety: Safety, orbit: Orbit, dt_s: float) -> None:
+    """Refuse formations without a slot for each follower, and slots that come too near to each other or the leader."""
+    places = [
+        _state(each, orbit, "start.formation")[None, :3] for each in _slots(start.formation, count, orbit, "start")
+    ]
+    _check_distances(places, safety.min_distance_m, "start.formation")
+    start_s = 0.0
+    for index, phase in enumerate(phases):
+        arrival_s = start_s + whole_steps(phase.transfer_orbits, orbit, dt_s) * dt_s
+        end_s = arrival_s + whole_steps(phase.hold_orbits, orbit, dt_s) * dt_s
+        times_s = np.arange(arrival_s, min(end_s, arrival_s + orbit.period_s) + dt_s, dt_s)
+        slots = _slots(phase.formation, count, orbit, f"phases.{index}")
+        paths = [slot.reference(times_s, orbit, arrival_s)[:, :3] for slot in slots]
+        _check_distances(paths, safety.min_distance_m, f"phases.{index}.formation")
+        start_s = end_s
+
+
+def _slots(formation: Formation, count: int, orbit: Orbit, key: str) -> Sequence[Formation]:
+    """The slots of a formation, which may be defined outside the package."""
+    try:
+        slots = formation.slots(count, orbit)
+    except ValueError as error:
+        raise ValueError(f"{key}.formation: {error}") from None
+    if len(slots) != count:
+        raise ValueError(f"{key}.formation: must have {count} slots, got {len(slots)}")
+    return slots
+
+
+def _check_distances(paths: Sequence[Array], least_m: float, key: str) -> None:
+    """Refuse paths (T, 3), m, that meet, or come nearer than a distance to each other or to the leader."""
+    for i, path in enumerate(paths):
+        for j, other in enumerate(paths[:i]):
+            distance_m = float(np.linalg.norm(path - other, axis=1).min())
+            if distance_m < SAME_PLACE_M:
+                raise ValueError(f"{key}: slots {j} and {i} are one place, or meet on the way")
+            if distance_m < least_m:
+                raise ValueError(f"{key}: slots {j} and {i} {_too_near(distance_m, least_m)}")
+        distance_m = float(np.linalg.norm(path, axis=1).min())
+        if distance_m < least_m:
+            raise ValueError(f"{key}: slot {i} and the leader {_too_near(distance_m, least_m)}")
+
+
+def _too_near(distance_m: float, least_m: float) -> str:
+    return f"come within {distance_m:.6g} m, nearer than safety.min_distance_m = {least_m:g} m"
 
 
 def _state(formation: Formation, orbit: Orbit, key: str) -> Array:

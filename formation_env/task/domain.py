@@ -49,7 +49,13 @@ def warnings_of(scenario: Scenario) -> list[str]:
 
 @lru_cache(maxsize=64)
 def beyond_the_model(scenario: Scenario) -> tuple[str, ...]:
-    """Say at which range the linear equations fail, and which transfers are beyond the thruster."""
+    """Say at which range the linear equations fail, and which transfers are beyond the thruster.
+
+    Of several followers each is looked at in a slot of its own.
+    """
+    if scenario.followers > 1:
+        alone = [scenario.follower_alone(follower, follower) for follower in range(scenario.followers)]
+        return tuple(dict.fromkeys(sentence for each in alone for sentence in beyond_the_model(each)))
     sentences = []
     range_m = max_range_m(scenario)
     error_m = curvature_error_m(range_m, scenario.orbit)
@@ -99,8 +105,12 @@ def facts_of(scenario: Scenario) -> dict[str, float]:
         period_s, num_steps, duration_s of the episode; delta_v_authority_m_s, full thrust along one axis throughout;
         transfer_authority_m_s, the same during transfers; transfer_least_delta_v_m_s, the least sum over LVLH axes by
         the linear model; transfer_least_accel_m_s2, the least acceleration limit that still allows each transfer;
-        max_range_m of start and holds; curvature_error_m there; valid_range_m of the linear equations.
+        max_range_m of start and holds; curvature_error_m there; valid_range_m of the linear equations. Of several
+        followers, each in a slot of its own, the greatest.
     """
+    if scenario.followers > 1:
+        alone = [facts_of(scenario.follower_alone(follower, follower)) for follower in range(scenario.followers)]
+        return {name: max(facts[name] for facts in alone) for name in alone[0]}
     craft, transfers = scenario.spacecraft, _transfers(scenario)
     range_m = max_range_m(scenario)
     return {

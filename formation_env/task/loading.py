@@ -14,6 +14,7 @@ from formation_env.dropout import DROPOUTS
 from formation_env.dynamics import DYNAMICS, NONLINEAR
 from formation_env.formations import FORMATIONS
 from formation_env.registration import ENV_IDS as ENV_IDS
+from formation_env.registration import SWARM_IDS as SWARM_IDS
 from formation_env.settings import ConfigError, build, load_yaml, nearest
 from formation_env.task.domain import DomainWarning, beyond_the_model
 from formation_env.task.scenario import Scenario
@@ -30,8 +31,17 @@ def config_folder(name: str) -> Path:
 
 
 def scenario_names() -> list[str]:
-    """Names of the scenarios that come with the package."""
-    return sorted(path.stem for path in config_folder("scenarios").glob("*.yaml"))
+    """Names of the scenarios of one follower that come with the package."""
+    return _names("scenarios")
+
+
+def swarm_names() -> list[str]:
+    """Names of the scenarios of several followers that come with the package."""
+    return _names("swarms")
+
+
+def _names(folder: str) -> list[str]:
+    return sorted(path.stem for path in config_folder(folder).glob("*.yaml"))
 
 
 def load_scenario(scenario: str | Path | Scenario) -> Scenario:
@@ -54,16 +64,17 @@ def _read(name: str) -> Scenario:
     Raises:
         ConfigError: one line per fault, naming file, key and value.
     """
-    path = Path(ENV_IDS.get(name, name))
+    path = Path((ENV_IDS | SWARM_IDS).get(name, name))
     if path.suffix not in SUFFIXES:
-        known = scenario_names()
+        swarms = swarm_names()
+        known = [*scenario_names(), *swarms]
         if str(path) not in known:
             if len(path.parts) > 1 or path.suffix:
                 raise ConfigError(
                     f"{name[:80]}: no scenario has this name, and a scenario file must end in .yaml or .yml"
                 )
             raise ConfigError(f"no scenario named {name[:80]!r}; {nearest(name[:80], known)}")
-        path = config_folder("scenarios") / f"{path}.yaml"
+        path = config_folder("swarms" if str(path) in swarms else "scenarios") / f"{path}.yaml"
     loaded = build(Scenario, load_yaml(path), str(path))
     try:
         draw_variants(loaded)

@@ -156,14 +156,22 @@ def markdown_table() -> str:
 
 def observation_layout(scenario: Scenario) -> ObservationLayout:
     """The observation layout with the scenario's scales."""
-    start = np.linalg.norm(scenario.start.formation.state(scenario.orbit)[:3])
-    held = [
-        np.linalg.norm(leg_reference(scenario, leg, np.arange(leg.arrival, leg.end + 1))[:, :3], axis=1).max()
-        for leg in legs(scenario)
-    ]
     return ObservationLayout(
-        length_m=float(max(start, *held, LEAST_LENGTH_M, scenario.limits.max_distance_m / BOUND)),
+        length_m=scenario.observation_length_m or _largest_distance_m(scenario),
         mean_motion_rad_s=scenario.orbit.mean_motion_rad_s,
         period_s=scenario.orbit.period_s,
         num_phases=len(scenario.phases),
     )
+
+
+def _largest_distance_m(scenario: Scenario) -> float:
+    """The largest distance of the plan from the leader, in any slot, and at least what the limits need."""
+    count, orbit = scenario.followers, scenario.orbit
+    starts = [slot.state(orbit) for slot in scenario.start.formation.slots(count, orbit)]
+    held = [
+        leg_reference(scenario, leg, np.arange(leg.arrival, leg.end + 1), slot)
+        for leg in legs(scenario)
+        for slot in leg.phase.formation.slots(count, orbit)
+    ]
+    farthest_m = np.linalg.norm(np.vstack([*starts, *held])[:, :3], axis=1).max()
+    return float(max(farthest_m, LEAST_LENGTH_M, scenario.limits.max_distance_m / BOUND))

@@ -2,7 +2,7 @@
 
 from dataclasses import fields, replace
 from functools import lru_cache
-from typing import Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -17,8 +17,24 @@ from formation_env.navigation.filter_settings import FilterModel, KalmanFilter
 from formation_env.navigation.sensor import Sensor
 from formation_env.orbital.orbit import Orbit
 from formation_env.quantities import Acceleration, PositiveDistance
-from formation_env.settings import Positive, Text, settings
-from formation_env.task.checks import check_durations, check_memory, check_models, check_spacecraft, check_start
+from formation_env.settings import ConfigError, Positive, Text, faults_of, settings
+from formation_env.task.checks import (
+    check_durations,
+    check_followers,
+    check_memory,
+    check_models,
+    check_safety,
+    check_slots,
+    check_spacecraft,
+    check_start,
+)
+from formation_env.task.followers import (
+    Followers,
+    FollowerSettings,
+    InterSatelliteLink,
+    Neighbours,
+    Safety,
+)
 from formation_env.task.phases import Limits, Phase, Start, whole_steps
 from formation_env.task.randomization import DomainRandomization
 from formation_env.task.reward import Reward
@@ -44,7 +60,16 @@ class Scenario:
         phases: the phases of the mission, in order.
         reward: weights and error cost.
         limits: conditions that end an episode early.
+        safety: distances that cost or end an episode.
         tolerance_m: position error that counts as good in the report, m.
+        followers: number of followers; formations must have a slot for each.
+        slots: whether follower i flies in slot i of each phase (`fixed`), or each episode draws who flies where
+            (`random`); it starts in slot i either way.
+        follower_settings: what each follower has of its own, in order; empty if they are alike.
+        inter_satellite_link: links between followers.
+        neighbours: how many others a follower's observation shows; None: all.
+        observation_length_m: scale of lengths in the observation; None: the largest distance of the plan, and more if
+            it needs that, see `task.observation`.
         domain_randomization: quantities that differ from episode to episode; policies are designed for the nominal
             values above.
     """
@@ -64,7 +89,14 @@ class Scenario:
     phases: tuple[Phase, ...]
     reward: Reward = Reward()
     limits: Limits = Limits()
+    safety: Safety = Safety()
     tolerance_m: PositiveDistance = 50.0
+    followers: Followers = 1
+    slots: Literal["fixed", "random"] = "fixed"
+    follower_settings: tuple[FollowerSettings, ...] = ()
+    inter_satellite_link: InterSatelliteLink = InterSatelliteLink()
+    neighbours: Neighbours | None = None
+    observation_length_m: PositiveDistance | None = None
     domain_randomization: DomainRandomization | None = None
 
     @model_validator(mode="after")
@@ -72,13 +104,55 @@ class Scenario:
         """Refuse what no single field can."""
         check_models(self.dynamics, self.filter.dynamics, self.orbit, self.perturbations)
         check_spacecraft(self.spacecraft, self.leader)
+        check_safety(self.safety)
         check_durations(self.phases, self.orbit, self.dt_s)
         check_memory("dt_s", self.num_steps, self.dt_s, self.dynamics, self.filter_model.dynamics)
-        check_start(self.start, self.phases, self.limits, self.orbit, self.dt_s)
+        if self.followers > 1:
+            self._check_followers()
+        else:
+            check_start(self.start, self.phases, self.limits, self.orbit, self.dt_s)
         if self.dynamics == NONLINEAR:
             check_leader_path(self.world, self.leader, self.num_steps * self.dt_s)
         self.dropout.chain(self.dt_s, self.orbit)
         return self
+
+    def _check_followers(self) -> None:
+        """Refuse slots and followers that cannot be."""
+        check_followers(self.followers, self.follower_settings, self.neighbours, self.domain_randomization is not None)
+        steps = self.num_steps * self.followers**2
+        check_memory("followers", steps, self.dt_s, self.dynamics, self.filter_model.dynamics)
+        check_slots(self.start, self.phases, self.followers, self.safety, self.orbit, self.dt_s)
+        for follower in range(self.followers):
+            try:
+                self.follower_alone(follower, follower)
+            except ConfigError as error:
+                raise ValueError(f"follower {follower}: {faults_of(error)}") from None
+        self.inter_satellite_link.dropout.chain(self.dt_s, self.orbit)
+
+    def follower_alone(self, follower: int, slot: int) -> Self:
+        """The scenario that one of several followers flies, as if it were alone.
+
+        Args:
+            follower: its index, which is also the slot that it starts in.
+            slot: the slot that it has in all phases.
+
+        Raises:
+            ConfigError: the scenario is invalid for this follower.
+        """
+        own = self.follower_settings[follower] if self.follower_settings else FollowerSettings()
+        changed: dict[str, Any] = {field.name: getattr(own, field.name) for field in fields(own)}
+        changed = {name: value for name, value in changed.items() if value is not None}
+        if "spacecraft" in changed:
+            changed["leader_spacecraft"] = self.leader
+        start = replace(self.start, formation=self.start.formation.slots(self.followers, self.orbit)[follower])
+        formations = [phase.formation.slots(self.followers, self.orbit)[slot] for phase in self.phases]
+        changed["phases"] = tuple(map(lambda phase, own: replace(phase, formation=own), self.phases, formations))
+        return replace(self, **changed, start=start, followers=1, slots="fixed", follower_settings=(), neighbours=None)
+
+    @property
+    def num_neighbours(self) -> int:
+        """How many others a follower's observation shows."""
+        return self.followers - 1 if self.neighbours is None else self.neighbours
 
     def steps(self, periods: float) -> int:
         """Nearest whole number of steps of a time in orbital periods."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from formation_env.dynamics.base import CROSS_TRACK, IN_PLANE, DiscreteModel
+from formation_env.formations import Formation
 from formation_env.numerics.arrays import Array
 from formation_env.task.phases import Phase
 from formation_env.task.reward import Scoring, scoring
@@ -66,10 +67,18 @@ def legs(scenario: Scenario) -> list[Leg]:
     return result
 
 
-def leg_reference(scenario: Scenario, leg: Leg, steps: ArrayLike) -> Array:
-    """Reference states (..., 6) of a leg at instants (...), in steps: on the way to the arrival and after it."""
+def leg_reference(scenario: Scenario, leg: Leg, steps: ArrayLike, slot: Formation | None = None) -> Array:
+    """Reference states (..., 6) of a leg at instants (...), in steps: on the way to the arrival and after it.
+
+    Args:
+        scenario: the scenario.
+        leg: one of its legs.
+        steps: instants (...).
+        slot: the formation of one of several followers; None: the leg's.
+    """
     times_s = np.asarray(steps) * scenario.dt_s
-    return leg.phase.formation.reference(times_s, scenario.orbit, leg.arrival * scenario.dt_s)
+    formation = slot or leg.phase.formation
+    return formation.reference(times_s, scenario.orbit, leg.arrival * scenario.dt_s)
 
 
 def score_table(scenario: Scenario) -> Scoring:

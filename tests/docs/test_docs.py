@@ -18,7 +18,7 @@ import typer
 from ruamel.yaml import YAML
 
 from baselines.report.results_page import results_page
-from formation_env import ENV_IDS, Scenario, load_scenario, scenario_names
+from formation_env import ENV_IDS, SWARM_IDS, Scenario, load_scenario, scenario_names, swarm_names
 from formation_env.dropout import DROPOUTS
 from formation_env.evaluation import evaluate
 from formation_env.evaluation.seeds import seeds
@@ -139,8 +139,8 @@ def test_environments_have_the_steps_that_the_table_says() -> None:
 
 def test_names_are_complete() -> None:
     """All ids, scenarios and metrics stand where a reader looks for them."""
-    assert [name for name in ENV_IDS if f"`{name}`" not in PAGES["README.md"]] == []
-    assert [name for name in scenario_names() if f"`{name}`" not in PAGES["docs/scenarios.md"]] == []
+    assert [name for name in (*ENV_IDS, *SWARM_IDS) if f"`{name}`" not in PAGES["README.md"]] == []
+    assert [name for name in (*scenario_names(), *swarm_names()) if f"`{name}`" not in PAGES["docs/scenarios.md"]] == []
     assert [name for name in METRICS if f"| `{name}` |" not in PAGES["docs/glossary.md"]] == []
 
 
@@ -168,9 +168,11 @@ def test_scenario_keys_and_defaults() -> None:
     for registry in (FORMATIONS, DROPOUTS):
         for kind, cls in registry.items():
             known |= keys(f"{kind}.", cls)
+    known["inter_satellite_link.dropout"] = {"kind": known["inter_satellite_link.dropout"].kind}
+    known["follower_settings"] = []
     known["windows.windows"] = [{"start_s": 0, "duration_s": 3000}]
     known |= {"at_leader": "-"}
-    shipped = set(scenario_names())
+    shipped = {*scenario_names(), *swarm_names()}
     assert {key: value for key, value in said.items() if key not in shipped} == known
 
 
@@ -179,7 +181,8 @@ def test_every_shipped_kind_builds_from_its_documented_keys() -> None:
     for name, registry in (("scenarios", FORMATIONS), ("models", DROPOUTS)):
         for kind, cls in registry.items():
             assert re.search(rf"`{kind}[.`]", PAGES[f"docs/{name}.md"])
-            assert build(cls, {"kind": kind}, "docs").kind == kind
+            required = {"formations": [{"kind": "at_leader"}]} if kind == "list" else {}
+            assert build(cls, {"kind": kind, **required}, "docs").kind == kind
 
 
 def program() -> Any:

@@ -51,7 +51,7 @@ class Room:
     dropout: Annotated[AnyDropout, "any annotation"] = Windows()
 
 
-KINDS = "at_leader, following, in_track, parallel, projected_circle, space_circle, xy_ellipse"
+KINDS = "at_leader, following, in_track, list, parallel, projected_circle, space_circle, train, xy_ellipse"
 
 
 def test_builds_nested_settings() -> None:

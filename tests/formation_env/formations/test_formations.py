@@ -14,9 +14,11 @@ from formation_env.formations import (
     Following,
     Formation,
     InTrack,
+    Listed,
     Parallel,
     ProjectedCircle,
     SpaceCircle,
+    Train,
     XYEllipse,
 )
 from formation_env.orbital.orbit import Orbit
@@ -36,6 +38,9 @@ STATES: dict[str, tuple[Formation, list[float]]] = {
     "in_track": (InTrack(y0_m=5000.0), [0, 5000, 5000 * 7.292115e-5 / N * math.sin(math.pi / 3), 0, 0, 0]),
     "space_circle": (SpaceCircle(), [2000, 0.4 / N, 2000 * ROOT_3, 0.2, -4000 * N, 0.2 * ROOT_3]),
     "projected_circle": (ProjectedCircle(vx0_m_s=1.8), [0, 3.6 / N, 0, 1.8, 0, 3.6]),
+    # Formations of several followers give the place of the first.
+    "train": (Train(), [0, -1000, 0, 0, 0, 0]),
+    "list": (Listed(formations=(Following(y0_m=-300.0),)), [0, -300, 0, 0, 0, 0]),
 }
 CENTRED = [XYEllipse(vx0_m_s=0.7), SpaceCircle(), ProjectedCircle(), ProjectedCircle(x0_m=-500.0, vx0_m_s=0.3)]
 
@@ -43,7 +48,7 @@ CENTRED = [XYEllipse(vx0_m_s=0.7), SpaceCircle(), ProjectedCircle(), ProjectedCi
 def test_every_formation_is_tested() -> None:
     """The table above covers the registry, and each class answers to its registered name."""
     assert set(STATES) == set(FORMATIONS)
-    assert all(cls().kind == name for name, cls in FORMATIONS.items())
+    assert all(type(formation) is FORMATIONS[formation.kind] for formation, _ in STATES.values())
 
 
 @pytest.mark.parametrize("name", STATES)
