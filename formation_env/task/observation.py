@@ -81,13 +81,29 @@ BLOCKS: Final = (
 )
 
 
-def _slices() -> dict[str, slice]:
-    ends = np.cumsum([block.size for block in BLOCKS])
-    return {block.name: slice(int(end) - block.size, int(end)) for block, end in zip(BLOCKS, ends, strict=True)}
+NEIGHBOUR_BLOCKS: Final = (
+    Block("relative_estimate", 6, "its estimated state, by its last message, minus one's own", "m, m/s", _LINEAR),
+    Block("relative_reference", 6, "its reference state minus one's own", "m, m/s", _LINEAR),
+    Block("closest_distance", 1, "least distance in the coming half orbit if both coast (HCW)", "m", "/ L"),
+    Block("closest_time", 1, "time until then", "s", "/ period"),
+    Block("message_age", 1, "time since its last message", "s", "log(1 + / dt) / log(1 + period / dt)"),
+    Block(
+        "relative_sigma_pos", 1, "1-sigma error of the relative position, as of `sigma_pos`", "m", "log10(/ 1 m) / 3"
+    ),
+    Block("present", 1, "1; or 0 if its episode has ended, and all of the block with it", "", ""),
+)
+"""What a follower's observation shows of each neighbour, behind its own; the least `closest_distance` comes first."""
 
 
-SLICES: Final = _slices()
+def _slices(blocks: tuple[Block, ...]) -> dict[str, slice]:
+    ends = np.cumsum([block.size for block in blocks])
+    return {block.name: slice(int(end) - block.size, int(end)) for block, end in zip(blocks, ends, strict=True)}
+
+
+SLICES: Final = _slices(BLOCKS)
 SIZE: Final = sum(block.size for block in BLOCKS)
+NEIGHBOUR_SLICES: Final = _slices(NEIGHBOUR_BLOCKS)
+NEIGHBOUR_SIZE: Final = sum(block.size for block in NEIGHBOUR_BLOCKS)
 
 
 @dataclass(frozen=True)
@@ -100,12 +116,21 @@ class ObservationLayout:
         mean_motion_rad_s: n; n L is the scale of velocities.
         period_s: the scale of times, s.
         num_phases: phases of the plan.
+        dt_s: the step, s.
+        num_neighbours: how many other followers it shows.
     """
 
     length_m: float
     mean_motion_rad_s: float
     period_s: float
     num_phases: int
+    dt_s: float
+    num_neighbours: int
+
+    @property
+    def size(self) -> int:
+        """Number of elements."""
+        return SIZE + self.num_neighbours * NEIGHBOUR_SIZE
 
     @property
     def state_scale(self) -> Array:
@@ -116,7 +141,7 @@ class ObservationLayout:
         """A block of six, `error`, `zero_effort_miss` or `reference`, in m and m/s.
 
         Args:
-            observation: (..., SIZE).
+            observation: (..., size).
             name: the block.
 
         Returns:
@@ -142,12 +167,33 @@ class ObservationLayout:
         """Index of the phase (...)."""
         return np.rint(self.scalar(observation, "phase") * self.num_phases).astype(np.intp)
 
+    def neighbours(self, observation: NDArray[np.floating], name: str) -> Array:
+        """A block of all neighbours, nearest first, in SI units.
 
-def markdown_table() -> str:
-    """The layout as a Markdown table: index, name, meaning, unit, scale."""
+        Args:
+            observation: (..., size).
+            name: the block, of `NEIGHBOUR_BLOCKS`.
+
+        Returns:
+            States (..., num_neighbours, 6), or numbers (..., num_neighbours).
+        """
+        shape = (*observation.shape[:-1], self.num_neighbours, NEIGHBOUR_SIZE)
+        block: Array = observation[..., SIZE:].reshape(shape)[..., NEIGHBOUR_SLICES[name]].astype(np.float64)
+        if name.startswith("relative") and block.shape[-1] == 6:
+            return block * self.state_scale
+        value = block[..., 0]
+        if name == "message_age":
+            return np.expm1(value * np.log1p(self.period_s / self.dt_s)) * self.dt_s
+        if name == "relative_sigma_pos":
+            return SIGMA_UNIT_POS_M * 10 ** (SIGMA_DECADES * value)
+        return value * {"closest_distance": self.length_m, "closest_time": self.period_s, "present": 1.0}[name]
+
+
+def markdown_table(blocks: tuple[Block, ...] = BLOCKS) -> str:
+    """Blocks as a Markdown table: index, name, meaning, unit, scale."""
     lines = ["| index | name | meaning | unit | scale |", "|---|---|---|---|---|"]
-    for block in BLOCKS:
-        first, last = SLICES[block.name].start, SLICES[block.name].stop - 1
+    for block, place in zip(blocks, _slices(blocks).values(), strict=True):
+        first, last = place.start, place.stop - 1
         index = f"{first}" if first == last else f"{first}-{last}"
         cells = (index, f"`{block.name}`", block.meaning, block.unit, block.scale.replace("|", "\\|"))
         lines.append(f"| {' | '.join(cells)} |")
@@ -161,6 +207,8 @@ def observation_layout(scenario: Scenario) -> ObservationLayout:
         mean_motion_rad_s=scenario.orbit.mean_motion_rad_s,
         period_s=scenario.orbit.period_s,
         num_phases=len(scenario.phases),
+        dt_s=scenario.dt_s,
+        num_neighbours=scenario.num_neighbours,
     )
 
 
