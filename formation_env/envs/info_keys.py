@@ -24,6 +24,8 @@ _SHOWN: Final = {
     "phase": "phase",
 }
 """Info keys and the results that they show."""
+COST: Final = "cost"
+_OF_LIMITS: Final = {COST: "cost", "least_distance_m": "least_distance"}
 _OF_VARIANTS: Final = {"variant": "variant"}
 _OF_ANALYSIS: Final = {
     "measurement": "measurement",
@@ -50,16 +52,19 @@ class Info(NamedTuple):
     place: int | slice
 
 
-def keys_of(scenario: Scenario, analysis: bool) -> tuple[Info, ...]:
+def keys_of(scenario: Scenario, guarded: bool, analysis: bool) -> tuple[Info, ...]:
     """The info keys of a scenario's environments.
 
     Args:
         scenario: the scenario.
+        guarded: whether it limits anything that costs.
         analysis: whether the step's noises are among them, see `FormationEnv`.
     """
     shown: dict[str, str] = dict(_SHOWN)
     if scenario.domain_randomization is not None:
         shown |= _OF_VARIANTS
+    if guarded:
+        shown |= _OF_LIMITS
     if analysis:
         shown |= _OF_ANALYSIS
     infos = []

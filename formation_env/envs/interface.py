@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from formation_env.kernel.simulation import Simulation
 from formation_env.numerics.arrays import Array
+from formation_env.settings import ConfigError
 from formation_env.task import observation
+from formation_env.task.scenario import Scenario
 
 P = ParamSpec("P")
 
@@ -66,6 +68,17 @@ def known_arguments(init: Callable[P, None]) -> Callable[P, None]:
     return checked
 
 
+def one_follower(scenario: Scenario, other: str) -> Scenario:
+    """A scenario that must have one follower.
+
+    Raises:
+        ConfigError: it has several; it names the environment for these.
+    """
+    if scenario.followers > 1:
+        raise ConfigError(f"followers: {scenario.followers}, but this environment flies one; {other} flies several")
+    return scenario
+
+
 def check_seed(seed: Any) -> int | None:
     """A seed as a Python number, or None.
 
@@ -107,15 +120,26 @@ def read_start(options: Mapping[str, Any] | None, simulation: Simulation) -> Arr
         ValueError: an unknown option, or a start without numbers, of wrong shape, not finite, or beyond the limits of
             any variant.
     """
-    num_rows, limits = simulation.num_rows, simulation.scenario.limits
+    num_rows = simulation.num_rows
     unknown = set(options or {}) - {START_OPTION}
     if unknown:
         raise ValueError(f"reset options: unknown {sorted(unknown)}; known: {START_OPTION}")
     if not options or START_OPTION not in options:
         return None
-    given = _numbers(options[START_OPTION], START_OPTION, np.float64)
+    given = numbers(options[START_OPTION], START_OPTION, np.float64)
     if given.shape not in ((6,), (num_rows, 6)):
         raise ValueError(f"{START_OPTION}: shape must be (6,) or ({num_rows}, 6), got {given.shape}")
+    check_start(given, simulation)
+    return np.broadcast_to(given, (num_rows, 6))
+
+
+def check_start(given: Array, simulation: Simulation) -> None:
+    """Refuse starts (..., 6) that are not finite, or beyond the limits of any variant.
+
+    Raises:
+        ValueError: one of them is.
+    """
+    limits = simulation.scenario.limits
     if not np.isfinite(given).all():
         raise ValueError(f"{START_OPTION}: must be finite, got {given}")
     position, speed = given[..., :3], np.linalg.norm(given[..., 3:], axis=-1)
@@ -126,7 +150,6 @@ def read_start(options: Mapping[str, Any] | None, simulation: Simulation) -> Arr
         raise ValueError(f"{START_OPTION}: farther than {limits.max_distance_m:g} m from the reference: {given}")
     if (speed > min(each.orbit.speed_m_s for each in simulation.variants)).any():
         raise ValueError(f"{START_OPTION}: faster than the orbit itself: {given}")
-    return np.broadcast_to(given, (num_rows, 6))
 
 
 def check_action(action: Any) -> NDArray[np.float32]:
@@ -136,28 +159,28 @@ def check_action(action: Any) -> NDArray[np.float32]:
         ValueError: wrong shape, no numbers, or not finite.
     """
     is_ready = type(action) is np.ndarray and action.dtype is _FLOAT32  # as an action space samples it
-    array = action if is_ready else _numbers(action, "action", np.float32)
+    array = action if is_ready else numbers(action, "action", np.float32)
     if array.shape != (3,) or not isfinite(sum(array.tolist())):  # faster than numpy for three numbers
         raise ValueError(f"action: must be finite with shape (3,), got shape {array.shape}: {array}")
     return array
 
 
-def check_actions(actions: Any, num_rows: int) -> NDArray[np.float32]:
-    """Actions as float32 (num_rows, 3).
+def check_actions(actions: Any, *rows: int) -> NDArray[np.float32]:
+    """Actions as float32 (*rows, 3).
 
     Raises:
         ValueError: wrong shape, no numbers, or not finite; then it names the first row that is wrong.
     """
-    array = _numbers(actions, "actions", np.float32)
-    if array.shape != (num_rows, 3):
-        raise ValueError(f"actions: shape must be ({num_rows}, 3), got {array.shape}")
+    array = numbers(actions, "actions", np.float32)
+    if array.shape != (*rows, 3):
+        raise ValueError(f"actions: shape must be {(*rows, 3)}, got {array.shape}")
     if np.count_nonzero(np.isfinite(array)) < array.size:  # faster than `all`
-        row = int(np.argmin(np.isfinite(array).all(axis=1)))
-        raise ValueError(f"actions: row {row} must be finite, got {array[row]}")
+        row = tuple(np.argwhere(~np.isfinite(array).all(axis=-1))[0].tolist())
+        raise ValueError(f"actions: row {', '.join(map(str, row))} must be finite, got {array[row]}")
     return array
 
 
-def _numbers(values: Any, name: str, dtype: type[Any]) -> NDArray[Any]:
+def numbers(values: Any, name: str, dtype: type[Any]) -> NDArray[Any]:
     """Values as an array of floats; strings and flags are not taken as numbers.
 
     Raises:

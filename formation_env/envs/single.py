@@ -58,7 +58,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"render_mode: must be one of {self.metadata['render_modes']}, got {render_mode!r}")
-        self.scenario = load_scenario(scenario)
+        self.scenario = interface.one_follower(load_scenario(scenario), "FormationSwarmEnv")
         self._spec: EnvSpec | None = None
         self.render_mode = render_mode
         self.action_space = interface.action_space()
@@ -66,7 +66,10 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.simulation = Simulation(self.scenario, 1, with_noises=analysis)
         self._observations = self.simulation.new_observations()
         self._arguments = self.simulation.arguments(self._observations)
-        self._analysis = analysis
+        with_analysis = info_keys.keys_of(self.scenario, self.simulation.guarded, analysis)
+        self._info_keys_of_analysis = with_analysis[
+            len(info_keys.keys_of(self.scenario, self.simulation.guarded, False)) :
+        ]
         self._varied = self.scenario.domain_randomization is not None
         self._keyed = False
         self._renderer: Any = None
@@ -132,6 +135,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         simulation = self.simulation
         simulation.actions[0] = action
         simulation.fly(self._arguments)
+        simulation.count_safety()
         info, reward, terminated, truncated = self._read_results()
         if terminated or truncated:
             info[info_keys.TOTALS] = {name: float(value[0]) for name, value in episode_metrics(simulation).items()}
@@ -141,7 +145,7 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
 
     def _read_results(self) -> tuple[dict[str, Any], float, bool, bool]:
         """Info, reward and ends of the last step or reset; the info's vectors are views of a copy of its results."""
-        block, flags, integers, _ = self.simulation.results.blocks
+        block, flags, integers, safety, _ = self.simulation.results.blocks
         values = block.ravel().copy()
         error_m, delta_v, error_cost, exit_cost, nis, reward = values[_NUMBERS].tolist()
         (measured,), (terminated,), (truncated,) = flags.tolist()
@@ -154,14 +158,16 @@ class FormationEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "error_cost_m_s": error_cost,
             "exit_cost_m_s": exit_cost,
             "nis": nis,
+            "cost": 0.0,
             "measured": measured,
             "phase": integers.item(_PHASE),
         }
         if self._varied:
             info["variant"] = integers.item(_VARIANT)
-        if self._analysis:
-            for name, _, place_block, place in info_keys.keys_of(self.scenario, analysis=True)[len(info) :]:
-                info[name] = self.simulation.results.blocks[place_block][place, 0].copy()
+        if self.simulation.guarded:
+            (info["cost"],), (info["least_distance_m"],) = safety.tolist()
+        for name, _, place_block, place in self._info_keys_of_analysis:
+            info[name] = self.simulation.results.blocks[place_block][place, 0].copy()
         return info, reward, terminated, truncated
 
     def _show(self) -> None:

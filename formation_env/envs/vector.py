@@ -13,7 +13,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from formation_env.envs import info_keys, interface
-from formation_env.kernel.metrics import METRICS, episode_metrics
+from formation_env.kernel.metrics import METRICS, SAFETY_METRICS, episode_metrics
 from formation_env.kernel.reused_arrays import ReusedZeros
 from formation_env.kernel.simulation import Simulation
 from formation_env.kernel.threads import check_num_threads
@@ -66,10 +66,10 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             ConfigError: the scenario is wrong.
             ValueError: no rows, a render mode, an unknown autoreset mode, no steps or no threads.
         """
-        _check_arguments(num_envs, render_mode, max_episode_steps)
-        self.autoreset_mode = _autoreset_mode(autoreset_mode)
+        check_arguments(num_envs, render_mode, max_episode_steps)
+        self.autoreset_mode = read_autoreset_mode(autoreset_mode)
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.scenario = load_scenario(scenario)
+        self.scenario = interface.one_follower(load_scenario(scenario), "FormationSwarmVectorEnv")
         self.num_envs = num_envs
         self.max_episode_steps = min(max_episode_steps or self.scenario.num_steps, self.scenario.num_steps)
         self._is_cut = self.max_episode_steps < self.scenario.num_steps
@@ -80,9 +80,11 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.simulation = Simulation(self.scenario, num_envs, analysis, check_num_threads(num_threads, num_envs))
-        self._totals_blocks = ReusedZeros([((len(METRICS), num_envs), float)])
-        self._info_keys = info_keys.keys_of(self.scenario, analysis)
+        self._metrics = (*METRICS, *SAFETY_METRICS) if self.simulation.guarded else (*METRICS,)
+        self._totals_blocks = ReusedZeros([((len(self._metrics), num_envs), float)])
+        self._info_keys = info_keys.keys_of(self.scenario, self.simulation.guarded, analysis)
         self._every_row = np.ones(num_envs, bool)
+        self._no_cost = np.broadcast_to(0.0, num_envs)
         self._keyed = False
         self._waiting = np.empty(0, np.intp)  # rows that ended and are not reset yet
 
@@ -112,7 +114,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             ValueError: wrong options or number of seeds.
         """
         others = dict(options or {})
-        rows = self._rows(others.pop(MASK_OPTION, None))
+        rows = read_mask(others.pop(MASK_OPTION, None), self.num_envs, self._keyed)
         starts = interface.read_start(others, self.simulation)
         seeds = interface.check_seeds(seed, self.num_envs)
         if isinstance(seeds, range):
@@ -125,17 +127,6 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self.simulation.reset(rows, observations, None if starts is None else starts[rows])
         self._waiting = np.setdiff1d(self._waiting, rows)
         return observations, self._infos(None if len(rows) == self.num_envs else rows)
-
-    def _rows(self, mask: Any) -> NDArray[np.intp]:
-        """Indices of the rows to reset: all, or those of a mask."""
-        if mask is None:
-            return np.arange(self.num_envs)
-        mask = np.asarray(mask)
-        if mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
-            raise ValueError(f"{MASK_OPTION}: must be bool ({self.num_envs},), got {mask.dtype} {mask.shape}")
-        if not self._keyed and not mask.all():
-            raise ValueError(f"{MASK_OPTION}: the first reset must be of all rows")
-        return np.flatnonzero(mask)
 
     def _seed(self, seeds: Sequence[int | None], rows: NDArray[np.intp]) -> None:
         """Give streams to those of some rows that have a seed, or to all of them that have none yet."""
@@ -155,7 +146,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
             gymnasium.error.ResetNeeded: before the first reset, or a row has ended and autoreset is disabled.
         """
         actions = interface.check_actions(actions, self.num_envs)
-        self._check_ready()
+        check_ready(self._keyed, self._waiting if self.autoreset_mode is AutoresetMode.DISABLED else _NO_ROWS)
         simulation = self.simulation
         simulation.actions[:] = actions
         observations = simulation.new_observations()
@@ -177,16 +168,6 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         shown.update(finals)
         return observations, rewards, terminations, truncations, shown
 
-    def _check_ready(self) -> None:
-        """Refuse a step that needs a reset before it."""
-        if not self._keyed:
-            raise gymnasium.error.ResetNeeded("step: call reset first")
-        if len(self._waiting) and self.autoreset_mode is AutoresetMode.DISABLED:
-            rows = reprlib.repr(self._waiting.tolist())
-            raise gymnasium.error.ResetNeeded(
-                f"step: rows {rows} have ended; reset them with options={{'{MASK_OPTION}': mask}}"
-            )
-
     def _end(self, observations: Observations, ended: NDArray[np.intp], complete: NDArray[np.intp]) -> dict[str, Any]:
         """Infos of rows that ended, those of a complete plan with its totals; with SAME_STEP they are reset."""
         totals = self._totals(complete) if len(complete) else {}
@@ -198,7 +179,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         """Totals of rows that flew to their episode's end, in Gymnasium's form."""
         (columns,) = self._totals_blocks.take_for(rows)
         columns[:, rows] = list(episode_metrics(self.simulation, rows).values())
-        totals = info_keys.with_mask(dict(zip(METRICS, columns, strict=True)), self._mask(rows))
+        totals = info_keys.with_mask(dict(zip(self._metrics, columns, strict=True)), self._mask(rows))
         return {info_keys.TOTALS: totals, f"_{info_keys.TOTALS}": self._mask(rows)}
 
     def _begin_next(
@@ -215,10 +196,12 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
 
     def _infos(self, rows: NDArray[np.intp] | None = None) -> dict[str, Any]:
         """Infos of the last step or reset in Gymnasium's form, of all rows or zero but for some."""
-        simulation = self.simulation
-        if rows is None:
-            return info_keys.batched(self._info_keys, simulation.results, self._every_row.copy())
-        return info_keys.batched(self._info_keys, simulation.last_results(rows), self._mask(rows))
+        results = self.simulation.results if rows is None else self.simulation.last_results(rows)
+        mask = self._every_row.copy() if rows is None else self._mask(rows)
+        shown = info_keys.batched(self._info_keys, results, mask)
+        if not self.simulation.guarded:
+            shown |= info_keys.with_mask({info_keys.COST: self._no_cost}, mask)
+        return shown
 
     def _mask(self, rows: NDArray[np.intp]) -> Flags:
         """Which rows are among some (num_envs,)."""
@@ -227,7 +210,38 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         return mask
 
 
-def _check_arguments(num_envs: int, render_mode: str | None, max_episode_steps: int | None) -> None:
+def read_mask(mask: Any, num_rows: int, keyed: bool) -> NDArray[np.intp]:
+    """Indices of the rows to reset: all, or those of a mask.
+
+    Raises:
+        ValueError: no flags, another number of them, or not all of them before the rows have streams (`keyed`).
+    """
+    if mask is None:
+        return np.arange(num_rows)
+    mask = np.asarray(mask)
+    if mask.shape != (num_rows,) or mask.dtype != np.bool_:
+        raise ValueError(f"{MASK_OPTION}: must be bool ({num_rows},), got {mask.dtype} {mask.shape}")
+    if not keyed and not mask.all():
+        raise ValueError(f"{MASK_OPTION}: the first reset must be of all rows")
+    return np.flatnonzero(mask)
+
+
+def check_ready(keyed: bool, ended: NDArray[np.intp]) -> None:
+    """Refuse a step that needs a reset before it: of all rows, or of those that have ended.
+
+    Raises:
+        gymnasium.error.ResetNeeded: it does.
+    """
+    if not keyed:
+        raise gymnasium.error.ResetNeeded("step: call reset first")
+    if len(ended):
+        rows = reprlib.repr(ended.tolist())
+        raise gymnasium.error.ResetNeeded(
+            f"step: rows {rows} have ended; reset them with options={{'{MASK_OPTION}': mask}}"
+        )
+
+
+def check_arguments(num_envs: int, render_mode: str | None, max_episode_steps: int | None) -> None:
     """Refuse no rows, a render mode, or no steps."""
     if num_envs < 1:
         raise ValueError(f"num_envs: must be at least 1, got {num_envs}")
@@ -237,7 +251,7 @@ def _check_arguments(num_envs: int, render_mode: str | None, max_episode_steps: 
         raise ValueError(f"max_episode_steps: must be at least 1, got {max_episode_steps}")
 
 
-def _autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
+def read_autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
     """An autoreset mode, which may be given by its value.
 
     Raises:

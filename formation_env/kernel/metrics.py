@@ -107,10 +107,12 @@ _METRICS: Final = (
 )
 METRICS: Final = {metric.name: metric for metric in _METRICS}
 """All metrics, by name."""
+SAFETY_METRICS: Final = ("cost", "least_distance_m")
+"""Sum of the costs, and least distance from any other spacecraft."""
 
 
 def episode_metrics(simulation: Simulation, rows: Rows = ALL_ROWS) -> dict[str, Array]:
-    """Metrics of the episodes of some rows up to now, each (rows,)."""
+    """Metrics of the episodes of some rows up to now, each (rows,); those of safety if the scenario limits anything."""
     totals = simulation.totals(rows)
     variant = totals["variant"].astype(np.intp)
     episodes = EpisodeTotals(
@@ -126,7 +128,10 @@ def episode_metrics(simulation: Simulation, rows: Rows = ALL_ROWS) -> dict[str, 
         lost=totals["lost"],
         hold_steps=simulation.schedule[variant, 0, OFFSETS["counts_left"]],
     )
-    return {name: metric.formula(episodes) for name, metric in METRICS.items()}
+    metrics = {name: metric.formula(episodes) for name, metric in METRICS.items()}
+    if simulation.guarded:
+        metrics |= dict(zip(SAFETY_METRICS, simulation.safety_totals[:, rows], strict=True))
+    return metrics
 
 
 def _final_error(simulation: Simulation, rows: Rows, steps: Array, variant: NDArray[np.intp]) -> Array:

@@ -196,5 +196,8 @@ def _scalars(scenario: Scenario) -> Scalars:
         quadratic_cost=cost.quadratic,
         max_distance=scenario.limits.max_distance_m,
         keep_out=scenario.limits.keep_out_m,
+        min_distance=scenario.safety.min_distance_m,
+        collision_distance=scenario.safety.collision_distance_m,
+        max_error=scenario.safety.max_error_m or np.inf,
         tolerance=scenario.tolerance_m,
     )

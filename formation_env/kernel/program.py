@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from formation_env.files import hash_sources
 from formation_env.kernel import packing, settings, variants
 from formation_env.kernel.stages import (
+    closest_approach,
     kalman_filter,
     link,
     memory,
@@ -52,6 +53,7 @@ class Kinds(NamedTuple):
         sensor: in `sensor.KINDS` and `kalman_filter.MEASURE`.
         thruster: in `thruster.KINDS`.
         varied: whether rows fly different variants (see `variants`).
+        guarded: whether the scenario limits anything that costs, see `scenario.Safety`.
     """
 
     truth: str
@@ -59,6 +61,7 @@ class Kinds(NamedTuple):
     sensor: str
     thruster: str
     varied: bool
+    guarded: bool
 
 
 class Program(NamedTuple):
@@ -69,7 +72,7 @@ class Program(NamedTuple):
         keys: of the rows' random numbers, with the number of the next episode (rows, 3).
         schedule, seen, packed: what the scenario's variants need, `packing.pack_variants`.
         observations: (rows, SIZE), written.
-        results, flags, integers, noises: blocks (fields, rows), written; no fields of `noises` if nobody asks.
+        results, flags, integers, safety, noises: blocks (fields, rows), written; see `results.block_shapes`.
 
     Attributes:
         step: fly the rows of the tiles from first to last - 1 over one step, under actions (rows, 3); returns how many
@@ -100,9 +103,16 @@ TYPES: Final = {
     "results": _BLOCK,
     "flags": types.boolean[:, ::1],
     "integers": types.int64[:, ::1],
+    "safety": _BLOCK,
     "noises": _BLOCK,
 }
 """The types of the arguments of a program, by name; all arrays are C-contiguous."""
+
+
+def is_guarded(scenario: Scenario) -> bool:
+    """Whether anything but the distance from the reference is limited."""
+    safe = scenario.safety
+    return max(scenario.limits.keep_out_m, safe.min_distance_m, safe.collision_distance_m, safe.max_error_m) > 0.0
 
 
 def kinds_of(scenario: Scenario, num_variants: int) -> Kinds:
@@ -113,6 +123,7 @@ def kinds_of(scenario: Scenario, num_variants: int) -> Kinds:
         sensor=scenario.sensor.measures,
         thruster="ideal",
         varied=num_variants > 1,
+        guarded=is_guarded(scenario),
     )
 
 
@@ -131,7 +142,7 @@ def look() -> Any:
 @cache
 def dispatchers(kinds: Kinds) -> Program:
     """The functions of `program` as numba holds them, with what it knows of its cache."""
-    sources = _source_hash()
+    sources = source_hash()
     return Program(_step(kinds, sources), _reset(kinds, sources))
 
 
@@ -174,7 +185,7 @@ def stages_of(kinds: Kinds) -> Stages:
 def _step(kinds: Kinds, sources: str) -> Any:
     """Compile the step."""
     thrust, move, predict, sense, measure, table = stages_of(kinds)
-    varied = kinds.varied
+    varied, guarded = kinds.varied, kinds.guarded
 
     @compiled_program("step", kinds, sources)
     def step(
@@ -190,6 +201,7 @@ def _step(kinds: Kinds, sources: str) -> Any:
         results: Array,
         flags: Flags,
         integers: Integers,
+        safety: Array,
         noises: Array,
     ) -> int:
         """Fly rows over one step; the arguments are those of `Program`."""
@@ -212,6 +224,8 @@ def _step(kinds: Kinds, sources: str) -> Any:
             thrust(actions, row, work, work32, numbers, n)
             link.change(state, work32, numbers, n)
             true_motion.push(work, work32, numbers, n)
+            if guarded:
+                closest_approach.remember(state, work, n)
             move(state, work, numbers, table, n)
             predict(state, work, numbers, n)
             link.receive(state, work, numbers, n)
@@ -220,6 +234,13 @@ def _step(kinds: Kinds, sources: str) -> Any:
                 kalman_filter.innovate(state, work, n)
                 memory.write_noises(work, work32, numbers, noises, row, n)
             measure(state, work, numbers, n)
+            if guarded:
+                closest_approach.approach_leader(state, work, numbers, n)
+                closest_approach.end_approach(work, n)
+                reward.check_safety(state, work, numbers, n)
+                memory.write_safety(work, safety, row, n)
+            else:
+                reward.check_distance(state, work, numbers, n)
             reward.score(state, work, numbers, n)
             observe.observe(state, work, work32, n)
             memory.write_observations(work32, observations, row, n)
@@ -233,7 +254,7 @@ def _step(kinds: Kinds, sources: str) -> Any:
 def _reset(kinds: Kinds, sources: str) -> Any:
     """Compile the reset of some rows."""
     _, _, _, sense, measure, _ = stages_of(kinds)
-    varied = kinds.varied
+    varied, guarded = kinds.varied, kinds.guarded
 
     @compiled_program("reset", kinds, sources)
     def reset(
@@ -250,6 +271,7 @@ def _reset(kinds: Kinds, sources: str) -> Any:
         results: Array,
         flags: Flags,
         integers: Integers,
+        safety: Array,
         noises: Array,
     ) -> None:
         """Start the next episode of some rows, side by side in a spare tile; the arguments are those of `Program`."""
@@ -276,10 +298,19 @@ def _reset(kinds: Kinds, sources: str) -> Any:
                 kalman_filter.innovate(spare, work, n)
                 memory.scatter_noises(work, noises, rows, first, n)
             measure(spare, work, numbers, n)
+            if guarded:
+                closest_approach.remember(spare, work, n)
+                closest_approach.approach_leader(spare, work, numbers, n)
+                closest_approach.end_approach(work, n)
+                reward.check_safety(spare, work, numbers, n)
+                memory.scatter_safety(work, safety, rows, first, n)
+            else:
+                reward.check_distance(spare, work, numbers, n)
             reward.score(spare, work, numbers, n)
             observe.observe(spare, work, work32, n)
             memory.scatter_state(spare, spare_stream, states, streams, rows, first, n)
-            memory.scatter_results(spare, work, work32, observations, results, flags, integers, rows, first, n)
+            memory.scatter_results(spare, work, results, flags, integers, rows, first, n)
+            memory.scatter_observations(work32, observations, rows, first, n)
 
     return reset
 
@@ -288,7 +319,7 @@ def _reset(kinds: Kinds, sources: str) -> Any:
 def look_dispatcher() -> Any:
     """The function of `look` as numba holds it."""
 
-    @compiled_program("look", _source_hash())
+    @compiled_program("look", source_hash())
     def look(states: Array, schedule: Array, seen: Array32, observations: Array32) -> None:
         """Write the observations of all rows; the arguments are those of `Program`."""
         work, work32, _ = new_scratch(schedule, False)
@@ -314,7 +345,7 @@ COMPILED_SOURCES: Final = (
 """Sources whose functions or constants are compiled into the program."""
 
 
-def _source_hash() -> str:
+def source_hash() -> str:
     """Hash of all source files that the compiled code comes from."""
     package = Path(__file__).parents[1]
     return hash_sources(sorted(path for pattern in COMPILED_SOURCES for path in package.glob(pattern)))

@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_env.kernel.reused_arrays import Arrays, Shape
-from formation_env.kernel.tile import Flags, Integers, Noises, Results
+from formation_env.kernel.tile import Flags, Integers, Noises, Results, Safety
 
-NO_NOISES: Final = np.empty((0, 0))
 _PADDING: Final = 8
 """Least columns behind the rows, so that the fields of a block do not fall on the same lines of the processor's cache,
 and a number of which all columns are a multiple, so that each field begins a line."""
@@ -16,8 +15,11 @@ _BLOCKS: Final[tuple[tuple[Any, Any], ...]] = (
     (Results(), np.float64),
     (Flags(), np.bool_),
     (Integers(), np.int64),
+    (Safety(), np.float64),
     (Noises(), np.float64),
 )
+_ALWAYS: Final = 3
+"""Blocks that every simulation has."""
 
 
 def _places() -> dict[str, tuple[int, int | slice]]:
@@ -36,23 +38,24 @@ PLACES: Final = _places()
 RESULT_NAMES: Final = tuple(name for name, (block, _) in PLACES.items() if _BLOCKS[block][0] != Noises())
 
 
-def block_shapes(num_rows: int, with_noises: bool) -> tuple[Shape, ...]:
-    """Shapes and types of the blocks of `tile.Results`, `Flags` and `Integers`, and of `Noises` if asked for.
+def block_shapes(num_rows: int, guarded: bool, with_noises: bool) -> tuple[Shape, ...]:
+    """Shapes and types of the blocks of `tile.Results`, `Flags`, `Integers`, `Safety` and `Noises`.
 
     Args:
         num_rows: rows; each block is (fields, num_rows) or somewhat wider.
-        with_noises: whether the step's noises are asked for.
+        guarded: whether the scenario limits anything; if not, `Safety` has no fields.
+        with_noises: whether the step's noises are asked for; if not, `Noises` has no fields.
     """
     pitch = (num_rows + 2 * _PADDING - 1) // _PADDING * _PADDING if num_rows > 1 else 1
-    kept = _BLOCKS if with_noises else _BLOCKS[:-1]
-    return tuple(((sum(sizes), pitch), dtype) for sizes, dtype in kept)
+    kept = (*(True for _ in range(_ALWAYS)), guarded, with_noises)
+    return tuple(((sum(sizes) * each, pitch), dtype) for (sizes, dtype), each in zip(_BLOCKS, kept, strict=True))
 
 
 class StepResults:
     """What a step or a reset tells of all rows.
 
     Attributes:
-        blocks: fields of `tile.Results`, `Flags`, `Integers` and `Noises` by rows; no noises if nobody asks.
+        blocks: of `block_shapes`.
         num_rows: rows.
     """
 
@@ -60,13 +63,13 @@ class StepResults:
 
     def __init__(self, blocks: Arrays, num_rows: int) -> None:
         """Take blocks of `block_shapes`."""
-        self.blocks = blocks if len(blocks) == len(_BLOCKS) else (*blocks, NO_NOISES)
+        self.blocks = blocks
         self.num_rows = num_rows
 
     @classmethod
-    def zeros(cls, num_rows: int, with_noises: bool) -> "StepResults":
-        """Zero everywhere."""
-        return cls(tuple(np.zeros(*shape) for shape in block_shapes(num_rows, with_noises)), num_rows)
+    def zeros(cls, num_rows: int, shapes: tuple[Shape, ...]) -> "StepResults":
+        """Zero everywhere, in blocks of these shapes."""
+        return cls(tuple(np.zeros(*shape) for shape in shapes), num_rows)
 
     def copy(self) -> "StepResults":
         """The same values, of nobody else."""
@@ -74,7 +77,7 @@ class StepResults:
 
     def only(self, rows: NDArray[np.intp], blocks: Arrays) -> "StepResults":
         """The values of some rows, in blocks that are zero elsewhere."""
-        for mine, whole in zip(blocks, self.blocks, strict=False):
+        for mine, whole in zip(blocks, self.blocks, strict=True):
             mine[:, rows] = whole[:, rows]
         return StepResults(blocks, self.num_rows)
 

@@ -67,6 +67,9 @@ class Scalars(NamedTuple):
     quadratic_cost: float
     max_distance: float
     keep_out: float
+    min_distance: float
+    collision_distance: float
+    max_error: float  # infinite if there is none
     tolerance: float
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_env.kernel.packing import pack_variants
-from formation_env.kernel.program import kinds_of, look, program
+from formation_env.kernel.program import is_guarded, kinds_of, look, program
 from formation_env.kernel.results import RESULT_NAMES, StepResults, block_shapes
 from formation_env.kernel.reused_arrays import ReusedArrays, ReusedZeros
 from formation_env.kernel.stages.noise import STREAM_SIZE
@@ -40,10 +40,20 @@ class Simulation:
         schedule: the plans' tables (variants, steps, columns), see `schedule.FIELDS`; a shorter one repeats its end.
         plan_limits: steps of each variant's plan and its distance limit, m (variants, 2).
         actions: (num_rows, 3) float32, to be filled before `step`.
+        guarded: whether costs are computed.
+        safety_totals: sum of costs and least distance (m) of the rows' episodes up to now (2, num_rows), if guarded.
         results: of the last step or reset; `step` makes new ones, and does not change those that came before.
     """
 
-    def __init__(self, scenario: Scenario, num_rows: int, with_noises: bool = False, num_threads: int = 1) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        num_rows: int,
+        with_noises: bool = False,
+        num_threads: int = 1,
+        variants: tuple[Scenario, ...] | None = None,
+        guarded: bool = False,
+    ) -> None:
         """Make the rows; they have no streams before `seed`.
 
         Args:
@@ -51,25 +61,28 @@ class Simulation:
             num_rows: rows.
             with_noises: whether results hold the step's noises, see `tile.Noises`.
             num_threads: threads that share a step; results are the same bits for any number.
+            variants: what the rows may fly, if not what `draw_variants` gives.
+            guarded: whether costs are computed even if the scenario limits nothing.
         """
         tiles = -(-num_rows // LANES)
         self.scenario = scenario
         self.num_rows = num_rows
-        self.variants = draw_variants(scenario)
+        self.variants = variants or draw_variants(scenario)
         self.schedule, self._seen, self._settings = pack_variants(self.variants)
         self.actions = np.zeros((num_rows, 3), np.float32)
-        self._with_noises = with_noises
-        shapes = block_shapes(num_rows, with_noises)
+        self.guarded = guarded or is_guarded(scenario)
+        self._shapes = shapes = block_shapes(num_rows, self.guarded, with_noises)
         self._blocks, self._last_blocks = ReusedArrays(shapes), ReusedZeros(shapes)
         self._observations = ReusedArrays([((num_rows, observation.SIZE), np.float32)])
-        self.results = StepResults.zeros(num_rows, with_noises)
+        self.results = StepResults.zeros(num_rows, shapes)
+        self.safety_totals = np.zeros((2, num_rows if self.guarded else 0))
         self._states = np.zeros((tiles, STATE_SIZE))
         self._streams = np.zeros((tiles, STREAM_SIZE), np.uint32)
         self._keys = np.zeros((num_rows, 3), np.uint64)
         self._arrays = (self._states, self._streams, self.schedule, self._seen, self._settings)
         num_parts = min(num_threads, tiles)
         self._parts = list(pairwise(tiles * part // num_parts for part in range(num_parts + 1)))
-        self._kinds = kinds_of(scenario, len(self.variants))
+        self._kinds = kinds_of(self.variants[0], len(self.variants))
         self.plan_limits = np.array([(each.num_steps, each.limits.max_distance_m) for each in self.variants])
         self._nominal_starts = np.array([each.start.formation.state(each.orbit) for each in self.variants])
 
@@ -99,6 +112,20 @@ class Simulation:
             observations,
             *self.results.blocks,
         )
+        self._begin_safety(rows)
+
+    def _begin_safety(self, rows: NDArray[np.intp]) -> None:
+        """Begin the totals of safety of some rows."""
+        if self.guarded:
+            self.safety_totals[0, rows] = 0.0
+            self.safety_totals[1, rows] = self.results["least_distance"][rows]
+
+    def count_safety(self) -> None:
+        """Add the last step to the totals of safety; `step` does so itself, `fly` does not."""
+        if self.guarded:
+            costs, least = self.safety_totals
+            costs += self.results["cost"]
+            np.minimum(least, self.results["least_distance"], out=least)
 
     def step(self, observations: Array32) -> int:
         """Fly all rows over one step with `actions`, and put new `results`.
@@ -112,7 +139,9 @@ class Simulation:
         del self.results  # so that its blocks are written again if nobody else holds them
         self.results = StepResults(self._blocks.take(), self.num_rows)
         parts = [self.arguments(observations, first, last) for first, last in self._parts]
-        return self.fly(parts[0]) if len(parts) == 1 else run_parts(lambda part: self.fly(parts[part]), len(parts))
+        ended = self.fly(parts[0]) if len(parts) == 1 else run_parts(lambda part: self.fly(parts[part]), len(parts))
+        self.count_safety()
+        return ended
 
     def arguments(self, observations: Array32, first: int = 0, last: int | None = None) -> tuple[Any, ...]:
         """Arguments of `fly` for the tiles from first to last - 1: where it writes observations, and results as now."""
@@ -134,7 +163,7 @@ class Simulation:
         if len(rows) < self.num_rows:
             self.results = self.results.copy()
         else:
-            self.results = StepResults.zeros(self.num_rows, self._with_noises)
+            self.results = StepResults.zeros(self.num_rows, self._shapes)
 
     def last_results(self, rows: NDArray[np.intp]) -> StepResults:
         """The results of some rows as they are now, zero elsewhere; no later step or reset changes them."""
@@ -142,15 +171,18 @@ class Simulation:
 
     def memory(self) -> Array:
         """Copy of the rows' state, random streams included, for `recall`: numbers (k,) of any meaning."""
-        parts = (self._states, self._streams, self._keys)
-        return np.concatenate([part.view(np.float64).ravel() for part in parts])
+        return np.concatenate([part.ravel() for part in self._remembered()])
 
     def recall(self, memory: Array) -> None:
         """Restore the rows' state from a copy made by `memory`."""
-        parts = [part.view(np.float64) for part in (self._states, self._streams, self._keys)]
+        parts = self._remembered()
         ends = np.cumsum([part.size for part in parts])
         for part, values in zip(parts, np.split(memory, ends[:-1]), strict=True):
             part[...] = values.reshape(part.shape)
+
+    def _remembered(self) -> list[Array]:
+        """Views of all that a step changes, as float64."""
+        return [part.view(np.float64) for part in (self._states, self._streams, self._keys, self.safety_totals)]
 
     def look(self, observations: Array32) -> None:
         """Write the observations (num_rows, SIZE) of all rows again, as the last step or reset left them."""

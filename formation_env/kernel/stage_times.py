@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from formation_env.kernel import variants
 from formation_env.kernel.program import Kinds, kinds_of, new_scratch, stages_of
 from formation_env.kernel.simulation import Simulation
-from formation_env.kernel.stages import link, memory, noise, observe, plan, reward
+from formation_env.kernel.stages import closest_approach, link, memory, noise, observe, plan, reward
 from formation_env.kernel.stages.memory import Flags, Integers
 from formation_env.kernel.stages.true_motion import push
 from formation_env.numerics.arrays import Array, Array32
@@ -45,6 +45,7 @@ class _Arrays(NamedTuple):
     results: Array
     flags: Flags
     integers: Integers
+    safety: Array
     known_line: NDArray[np.intp]
 
 
@@ -100,11 +101,11 @@ def _in_flight(scenario: Scenario, rows: int) -> tuple[Simulation, _Arrays]:
     simulation.step(observations)
     states, streams, schedule, seen, packed = simulation._arrays
     work, work32, own = cast(Any, new_scratch).py_func(schedule, len(simulation.variants) > 1)
-    results, flags, integers, _ = simulation.results.blocks
+    results, flags, integers, safety, _ = simulation.results.blocks
     numbers = own if len(own) else packed
     known_line = np.full(1, -1, np.intp)
     inputs = (states, streams, work, work32, own, schedule, seen, packed, numbers, simulation.actions)
-    return simulation, _Arrays(*inputs, observations, results, flags, integers, known_line)
+    return simulation, _Arrays(*inputs, observations, results, flags, integers, safety, known_line)
 
 
 def _loop(call: _Call) -> Any:
@@ -150,11 +151,28 @@ def _calls(kinds: Kinds) -> dict[str, _Call]:
     calls[_name(thrust)] = lambda a, state, stream, row, n: thrust(a.actions, row, a.work, a.work32, a.numbers, n)
     calls["link.change"] = lambda a, state, stream, row, n: link.change(state, a.work32, a.numbers, n)
     calls["true_motion.push"] = lambda a, state, stream, row, n: push(a.work, a.work32, a.numbers, n)
+    if kinds.guarded:
+        calls["closest_approach.remember"] = lambda a, state, stream, row, n: closest_approach.remember(
+            state, a.work, n
+        )
     calls[_name(move)] = lambda a, state, stream, row, n: move(state, a.work, a.numbers, table, n)
     calls[_name(predict)] = lambda a, state, stream, row, n: predict(state, a.work, a.numbers, n)
     calls["link.receive"] = lambda a, state, stream, row, n: link.receive(state, a.work, a.numbers, n)
     calls[_name(sense)] = lambda a, state, stream, row, n: sense(state, a.work, a.work32, a.numbers, n)
     calls[_name(measure)] = lambda a, state, stream, row, n: measure(state, a.work, a.numbers, n)
+    if kinds.guarded:
+        calls["closest_approach.approach_leader"] = lambda a, state, stream, row, n: closest_approach.approach_leader(
+            state, a.work, a.numbers, n
+        )
+        calls["closest_approach.end_approach"] = lambda a, state, stream, row, n: closest_approach.end_approach(
+            a.work, n
+        )
+        calls["reward.check_safety"] = lambda a, state, stream, row, n: reward.check_safety(state, a.work, a.numbers, n)
+        calls["memory.write_safety"] = lambda a, state, stream, row, n: memory.write_safety(a.work, a.safety, row, n)
+    else:
+        calls["reward.check_distance"] = lambda a, state, stream, row, n: reward.check_distance(
+            state, a.work, a.numbers, n
+        )
     calls["reward.score"] = lambda a, state, stream, row, n: reward.score(state, a.work, a.numbers, n)
     calls["observe.observe"] = lambda a, state, stream, row, n: observe.observe(state, a.work, a.work32, n)
     calls["memory.write_observations"] = lambda a, state, stream, row, n: memory.write_observations(

@@ -56,6 +56,12 @@ class Work(NamedTuple):
     relative: int = 6  # position and velocity relative to the leader along inertial axes
     before: int = 6  # the same at the substep's start
     rates: int = 42  # of each stage
+    # For what is checked along the step's arc.
+    start_state: int = 6  # the true state before the step
+    leader_distance: int = 1  # least distance from the leader, m
+    # The results of `Safety`, in its order.
+    cost: int = 1
+    least_distance: int = 1
     plan: int = schedule.WIDTH  # the row's line of the schedule; behind it stand its varying models
 
 
@@ -99,6 +105,13 @@ class Integers(NamedTuple):
     variant: int = 1
 
 
+class Safety(NamedTuple):
+    """What a step tells of a scenario that limits anything, float64 (fields, rows)."""
+
+    cost: int = 1  # 1 if the step violated what `scenario.Safety` asks for, else 0
+    least_distance: int = 1  # from any other spacecraft along the step's arc, m
+
+
 class Noises(NamedTuple):
     """Random numbers of a step in physical units and what the filter made of them, for those who ask (fields, rows)."""
 
@@ -108,7 +121,7 @@ class Noises(NamedTuple):
     thrust_noise: int = 1  # relative error of the thrust's magnitude
 
 
-Fields = TypeVar("Fields", State, Work, Work32, Results, Flags, Integers, Noises)
+Fields = TypeVar("Fields", State, Work, Work32, Results, Flags, Integers, Safety, Noises)
 
 
 def _placed(sizes: Fields, unit: int) -> Fields:
@@ -122,6 +135,7 @@ WORK32: Final = _placed(Work32(), LANES)
 RESULTS: Final = _placed(Results(), 1)
 FLAGS: Final = _placed(Flags(), 1)
 INTEGERS: Final = _placed(Integers(), 1)
+SAFETY: Final = _placed(Safety(), 1)
 NOISES: Final = _placed(Noises(), 1)
 
 STATE_SIZE: Final = sum(State()) * LANES
@@ -130,6 +144,7 @@ WORK32_SIZE: Final = sum(Work32()) * LANES
 NUM_RESULTS: Final = sum(Results())
 SHOWN: Final = RESULTS.reward
 """How many of the results infos show; the reward behind them is returned by itself."""
+NUM_SAFETY: Final = sum(Safety())
 NUM_NOISES: Final = sum(Noises())
 TOTALS: Final = State._fields[State._fields.index("step") :]
 """Names of the totals of the episode and what goes with them, the last fields of a row's state."""

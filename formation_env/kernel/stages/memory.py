@@ -12,6 +12,7 @@ from formation_env.kernel.tile import (
     INTEGERS,
     NOISES,
     NUM_NOISES,
+    NUM_SAFETY,
     RESULTS,
     SHOWN,
     STATE,
@@ -115,6 +116,23 @@ def write_results(
 
 
 @tile_function
+def write_safety(work: Array, safety: Array, first: int, n: int) -> None:
+    """Write what a step tells of safety, in the columns from `first` on."""
+    for k in range(turns(NUM_SAFETY, work)):
+        line = safety[k, first:]
+        for i in range(min(n, LANES)):
+            line[i] = work[WORK.cost + k * LANES + i]
+
+
+@tile_function
+def scatter_safety(work: Array, safety: Array, rows: NDArray[np.intp], first: int, n: int) -> None:
+    """Write what is told of safety for rows that begin."""
+    for i in range(n):
+        for k in range(NUM_SAFETY):
+            safety[k, rows[first + i]] = work[WORK.cost + k * LANES + i]
+
+
+@tile_function
 def write_noises(work: Array, work32: Array32, settings: Array, noises: Array, first: int, n: int) -> None:
     """Write what those who ask see of the random numbers, in the columns from `first` on."""
     for k in range(TO_NOISE):
@@ -149,11 +167,17 @@ def scatter_state(
 
 
 @tile_function
+def scatter_observations(work32: Array32, observations: Array32, rows: NDArray[np.intp], first: int, n: int) -> None:
+    """Write the observations of rows that begin."""
+    for i in range(n):
+        for k in range(SIZE):
+            observations[rows[first + i], k] = work32[WORK32.observation + k * LANES + i]
+
+
+@tile_function
 def scatter_results(
     spare: Array,
     work: Array,
-    work32: Array32,
-    observations: Array32,
     results: Array,
     flags: Flags,
     integers: Integers,
@@ -168,8 +192,6 @@ def scatter_results(
             results[k, row] = spare[STATE.true_state + k * LANES + i]
         for k in range(FROM_STATE, SHOWN):
             results[k, row] = work[WORK.thrust + (k - FROM_STATE) * LANES + i]
-        for k in range(SIZE):
-            observations[row, k] = work32[WORK32.observation + k * LANES + i]
         flags[MEASURED, row] = spare[STATE.measured + i] > 0.5
         integers[INTEGERS.phase, row] = np.int64(work[PHASE + i])
         integers[INTEGERS.variant, row] = np.int64(spare[STATE.variant + i])

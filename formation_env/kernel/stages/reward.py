@@ -1,4 +1,4 @@
-"""Reward of a step, end of the episode, and its totals."""
+"""Whether a step ends the episode or violates what is safe, its reward, and the episode's totals."""
 
 from typing import Final
 
@@ -19,24 +19,51 @@ ARRIVES_LEFT: Final = plan("arrives_left")
 
 
 @inline_scalar
-def reward_and_end(state: Array, work: Array, i: int, settings: Scalars) -> None:
-    """Reward of the step, and whether the episode ends (see `scenario.Reward` and `scenario.Limits`)."""
+def position_error(state: Array, work: Array, i: int) -> float:
+    """Distance from the reference position."""
     s, r = STATE.true_state + i, SCORED_POSITION + i
-    x, y, z = state[s], state[s + LANES], state[s + 2 * LANES]
-    dx, dy, dz = x - work[r], y - work[r + LANES], z - work[r + 2 * LANES]
-    error = np.sqrt(dx * dx + dy * dy + dz * dz)
-    outside = (error > settings.max_distance) | (x * x + y * y + z * z < settings.keep_out * settings.keep_out)
-    ends = outside & (state[STATE.step + i] > 0.0)
+    dx, dy, dz = state[s] - work[r], state[s + LANES] - work[r + LANES], state[s + 2 * LANES] - work[r + 2 * LANES]
+    error: float = np.sqrt(dx * dx + dy * dy + dz * dz)
+    return error
+
+
+@tile_function
+def check_distance(state: Array, work: Array, settings: Array, n: int) -> None:
+    """Position error, and whether it ends the episode; nothing else is limited."""
+    for i in range(min(n, LANES)):
+        error = position_error(state, work, i)
+        ends = (error > scalars(settings, i).max_distance) & (state[STATE.step + i] > 0.0)
+        work[WORK.position_error + i] = error
+        work[WORK.terminated + i] = 1.0 if ends else 0.0
+
+
+@tile_function
+def check_safety(state: Array, work: Array, settings: Array, n: int) -> None:
+    """Position error, cost and whether the episode ends, by the least distances along the arc (`scenario.Safety`)."""
+    for i in range(min(n, LANES)):
+        own, error, flown = scalars(settings, i), position_error(state, work, i), state[STATE.step + i] > 0.0
+        least, from_leader = work[WORK.least_distance + i], work[WORK.leader_distance + i]
+        inside = from_leader < own.keep_out
+        ends = (error > own.max_distance) | inside | (least < own.collision_distance)
+        strays = (error > own.max_error) & (work[COUNTS + i] > 0.0)
+        violates = inside | (least < own.min_distance) | strays
+        work[WORK.position_error + i] = error
+        work[WORK.terminated + i] = 1.0 if ends & flown else 0.0
+        work[WORK.cost + i] = 1.0 if violates & flown else 0.0
+
+
+@inline_scalar
+def step_reward(state: Array, work: Array, i: int, settings: Scalars) -> None:
+    """Reward of the step (see `scenario.Reward`), whose ends are checked already."""
+    error, ends = work[WORK.position_error + i], work[WORK.terminated + i] > 0.0
     # The penalty equals staying at the limit to the end, so leaving early never pays off.
     stay = max(error, settings.max_distance)
     stay_cost = work[WEIGHT_LEFT + i] * (settings.linear_cost * stay + settings.quadratic_cost * stay * stay)
     exit_cost = stay_cost if ends else 0.0
     error_cost = work[ERROR_WEIGHT + i] * (settings.linear_cost * error + settings.quadratic_cost * error * error)
-    work[WORK.position_error + i] = error
     work[WORK.error_cost + i] = error_cost
     work[WORK.exit_cost + i] = exit_cost
     work[WORK.reward + i] = -(work[WORK.delta_v + i] + error_cost + exit_cost)
-    work[WORK.terminated + i] = 1.0 if ends else 0.0
     work[WORK.truncated + i] = 1.0 if state[STATE.step + i] >= settings.num_steps else 0.0
 
 
@@ -60,8 +87,8 @@ def totals(state: Array, work: Array, i: int, settings: Scalars) -> None:
 
 @tile_function
 def score(state: Array, work: Array, settings: Array, n: int) -> None:
-    """Reward, end of the episode and totals."""
+    """Reward and totals of a step whose ends are checked already."""
     for i in range(min(n, LANES)):
-        reward_and_end(state, work, i, scalars(settings, i))
+        step_reward(state, work, i, scalars(settings, i))
     for i in range(min(n, LANES)):
         totals(state, work, i, scalars(settings, i))

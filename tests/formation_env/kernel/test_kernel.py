@@ -185,24 +185,24 @@ def test_the_hash_changes_with_each_source(tmp_path: Path, monkeypatch: pytest.M
     copy = tmp_path / "formation_env"
     shutil.copytree(PACKAGE, copy, ignore=shutil.ignore_patterns("__pycache__", "*.nb?"))
     monkeypatch.setattr(program, "__file__", str(copy / "kernel" / "program.py"))
-    before = program._source_hash()
+    before = program.source_hash()
     path = copy / f"{module}.py"
     path.write_text(path.read_text(encoding="utf-8") + "\n", encoding="utf-8")
-    assert program._source_hash() != before
+    assert program.source_hash() != before
 
 
 def test_the_program_carries_the_hash_of_its_sources() -> None:
     """The key is what the sources on the disk give: an equal checkout finds the cache, another does not."""
-    assert program._source_hash() == program._source_hash()
-    assert len(program._source_hash()) == 64
+    assert program.source_hash() == program.source_hash()
+    assert len(program.source_hash()) == 64
 
 
 def test_the_key_of_the_cache_is_the_same_in_each_process() -> None:
     """A program closes over functions, which are new in each process: its key holds names and a hash alone."""
     kinds = program.kinds_of(load_scenario("keeping"), 1)
     for function in program.dispatchers(kinds):
-        assert function._cache._key == (function.py_func.__name__, kinds, program._source_hash())
-    assert program.look_dispatcher()._cache._key == ("look", program._source_hash())
+        assert function._cache._key == (function.py_func.__name__, kinds, program.source_hash())
+    assert program.look_dispatcher()._cache._key == ("look", program.source_hash())
 
 
 def test_reset_writes_the_rows_asked_for_only() -> None:

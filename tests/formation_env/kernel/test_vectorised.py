@@ -22,9 +22,14 @@ from numba import types
 
 from formation_env.kernel import stages
 from formation_env.kernel.stages import (
+    closest_approach,
+    closest_coast,
+    group,
+    inter_satellite_link,
     kalman_filter,
     link,
     memory,
+    neighbours,
     noise,
     nonlinear_motion,
     observe,
@@ -35,6 +40,7 @@ from formation_env.kernel.stages import (
     thruster,
     true_motion,
 )
+from formation_env.kernel.stages.inter_satellite_link import LinkSettings
 
 INT, BOOL = types.intp, types.boolean
 FIELDS, FIELDS32, STREAM = types.float64[::1], types.float32[::1], types.uint32[::1]
@@ -42,6 +48,8 @@ TABLE, TABLE32 = types.float64[:, ::1], types.float32[:, ::1]
 FLAGS, INTEGERS = types.boolean[:, ::1], types.int64[:, ::1]
 PLANS, VIEWS = types.float64[:, :, ::1], types.float32[:, :, ::1]
 
+LINK: Final = types.NamedUniTuple(types.float64, len(LinkSettings._fields), LinkSettings)
+LANE_LIST: Final = types.intp[::1]
 MOTION: Final = (FIELDS, FIELDS, TABLE, INT, INT)
 FILTER: Final = (FIELDS, FIELDS, TABLE, INT)
 SENSE: Final = (FIELDS, FIELDS, FIELDS32, TABLE, INT)
@@ -65,6 +73,22 @@ STAGES: Final = {
     kalman_filter.innovate: ((FIELDS, FIELDS, INT), 6),
     kalman_filter.measure_position: (FILTER, 1),
     kalman_filter.measure_position_and_velocity: (FILTER, 2),
+    closest_approach.remember: ((FIELDS, FIELDS, INT), 1),
+    closest_approach.approach_leader: (FILTER, 2),
+    closest_approach.approach: ((*(FIELDS,) * 6, types.float64, INT), 2),
+    reward.check_distance: (FILTER, 1),
+    reward.check_safety: (FILTER, 1),
+    inter_satellite_link.begin: ((FIELDS, INT, STREAM, LINK, INT), 2),
+    inter_satellite_link.change: ((FIELDS, INT, STREAM, LINK, INT), 1),
+    inter_satellite_link.hear: ((FIELDS, INT, FIELDS, FIELDS, LINK, FIELDS, INT), 2),
+    closest_approach.end_approach: ((FIELDS, INT), 2),
+    closest_coast.closest_coast: ((*(FIELDS32,) * 3, INT), 1),
+    neighbours.scale: ((FIELDS, FIELDS, FIELDS32, FIELDS32, INT), 13),
+    neighbours._differences: ((*(FIELDS32,) * 3, INT), 2),
+    neighbours.look: ((FIELDS32, FIELDS32, FIELDS32, FIELDS, LANE_LIST, INT, FIELDS, FIELDS, FIELDS32, INT), 3),
+    neighbours.rank: ((TABLE32, types.int32[:, ::1], INT), 2),
+    group.end_together: ((TABLE, INT), 1),
+    memory.write_safety: ((FIELDS, TABLE, INT, INT), 1),
     reward.score: ((FIELDS, FIELDS, TABLE, INT), 2),
     observe.observe: ((FIELDS, FIELDS, FIELDS32, INT), 8),
     start.begin: ((FIELDS, FIELDS32, BOOL, TABLE, INT), 5),

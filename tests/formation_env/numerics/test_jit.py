@@ -116,7 +116,7 @@ def test_a_read_only_installation_without_a_home_imports() -> None:
         "    locator.from_function = classmethod(lambda cls, *_: None)\n"
         "import baselines.design.riccati, formation_env\n"
         "from formation_env.kernel.program import Kinds, dispatchers\n"
-        "dispatchers(Kinds('constant', 'constant', 'position', 'ideal', False)), formation_env.FormationEnv()"
+        "dispatchers(Kinds('constant', 'constant', 'position', 'ideal', False, False)), formation_env.FormationEnv()"
     )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert run.returncode == 0, run.stderr

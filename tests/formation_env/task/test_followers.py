@@ -85,7 +85,9 @@ def test_shipped_swarms_load_and_have_a_scenario_for_each_slot(name: str) -> Non
         for slot, each in enumerate(slots):
             target = scenario.phases[0].formation.slots(scenario.followers, scenario.orbit)[slot]
             assert each.phases[0].formation == target
-            assert observation_layout(each) == observation_layout(scenario)
+            assert replace(observation_layout(each), num_neighbours=scenario.num_neighbours) == observation_layout(
+                scenario
+            )
 
 
 def test_all_slots_of_a_circle_are_flown() -> None:
