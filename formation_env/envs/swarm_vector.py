@@ -23,6 +23,8 @@ from formation_env.task.observation import observation_layout
 from formation_env.task.scenario import Scenario
 
 Observations = NDArray[np.float32]
+ROWS_PER_FOLLOWER: Final = 4
+"""A follower of a group takes about as long as so many alone; from there on it pays to share a step."""
 Flags = NDArray[np.bool_]
 
 _NO_GROUPS: Final = np.empty(0, np.intp)
@@ -67,7 +69,7 @@ class FormationSwarmVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArr
         self.single_observation_space = joint(-observation.BOUND, observation.BOUND, (count, size))
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        threads = check_num_threads(num_threads, num_envs * count)
+        threads = check_num_threads(num_threads, num_envs * count * ROWS_PER_FOLLOWER)
         self.simulation = GroupSimulation(self.scenario, num_envs, analysis, threads)
         self._shape = (num_envs, count, size)
         self._info_keys = info_keys.keys_of(self.scenario, guarded=True, analysis=analysis)

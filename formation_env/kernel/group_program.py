@@ -11,12 +11,12 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from formation_env.kernel import packing
 from formation_env.kernel.program import (
     TYPES,
     Kinds,
     Rows,
     Streams,
-    new_scratch,
     source_hash,
     stages_of,
 )
@@ -38,10 +38,11 @@ from formation_env.kernel.stages import (
 )
 from formation_env.kernel.stages.inter_satellite_link import AGE, LinkSettings, pair, place
 from formation_env.kernel.stages.memory import Flags, Integers
-from formation_env.kernel.tile import STATE, STATE_SIZE, WORK
+from formation_env.kernel.tile import STATE, STATE_SIZE, WORK, WORK32_SIZE, WORK_SIZE
 from formation_env.numerics.arrays import Array, Array32
-from formation_env.numerics.jit import LANES, compiled_program, entry_point, tile_function
+from formation_env.numerics.jit import LANES, compiled_program, entry_point, tile_function, whole_vectors
 from formation_env.task.observation import NEIGHBOUR_SIZE
+from formation_env.task.schedule import WIDTH
 
 
 class Rules(NamedTuple):
@@ -71,6 +72,9 @@ GROUP_TYPES: Final = {
     "rules": types.float64[::1],
     "closed": types.float64[::1],
     "num_groups": types.intp,
+    "scratch64": types.float64[::1],
+    "scratch32": types.float32[::1],
+    "scratch_integers": types.intp[::1],
     "groups": types.intp[::1],
     "slots": types.int64[:, ::1],
 }
@@ -87,6 +91,7 @@ class GroupProgram(NamedTuple):
         gone: 1 where a follower's episode has ended before its group's (tiles, LANES), updated.
         rules: `Rules`, flat.
         closed: 1 while a dropout window of the links is open, at each instant (steps + 1,).
+        scratch64, scratch32, scratch_integers: of `scratch_sizes`; each thread has its own.
         packed: settings of the members, follower by follower and slot by slot (followers^2, SIZE).
         observations: (groups * followers, size), group by group, written.
 
@@ -127,7 +132,8 @@ class Scratch(NamedTuple):
         works: of each follower, double.
         works32: likewise, single.
         known: what followers know of one another (followers, `neighbours.KNOWN_SIZE`).
-        views: of the neighbours of one follower (followers - 1, `neighbours.VIEW_SIZE`).
+        views: of the neighbours of each follower (followers, followers - 1, `neighbours.VIEW_SIZE`).
+        spare_view: one more.
         lines: for the observations' parts of all neighbours.
         ranks: of the neighbours (followers - 1, LANES).
         lanes: groups in which a pair does not hear each other (pairs, LANES).
@@ -138,26 +144,47 @@ class Scratch(NamedTuple):
     works32: Array32
     known: Array32
     views: Array32
+    spare_view: Array32
     lines: Array32
-    ranks: NDArray[np.int32]
+    ranks: Rows
     lanes: Rows
     deaf: Rows
 
 
+def scratch_sizes(columns: int, count: int) -> tuple[int, int, int]:
+    """How many numbers of scratch space a block needs: double, single and whole.
+
+    Args:
+        columns: of the schedule.
+        count: followers.
+    """
+    others = count - 1
+    views = (count * others + 1) * neighbours.VIEW_SIZE + LANES * others * NEIGHBOUR_SIZE
+    return (
+        count * (WORK_SIZE + (columns - WIDTH) * LANES),
+        count * (WORK32_SIZE + neighbours.KNOWN_SIZE) + views,
+        count * others // 2 * (LANES + 1) + others * LANES,
+    )
+
+
 @tile_function
-def group_scratch(schedule: Array, count: int) -> Scratch:
-    """New scratch space."""
-    work, work32, _ = new_scratch(schedule, False)
+def group_scratch(numbers: Array, numbers32: Array32, integers: Rows, count: int) -> Scratch:
+    """Divide scratch space of `scratch_sizes`."""
     others, pairs = count - 1, count * (count - 1) // 2
+    known = count * WORK32_SIZE
+    views = known + count * neighbours.KNOWN_SIZE
+    spare = views + count * others * neighbours.VIEW_SIZE
+    lines = spare + neighbours.VIEW_SIZE
     return Scratch(
-        np.empty((count, len(work))),
-        np.empty((count, len(work32)), np.float32),
-        np.empty((count, neighbours.KNOWN_SIZE), np.float32),
-        np.empty((others, neighbours.VIEW_SIZE), np.float32),
-        np.empty(LANES * others * NEIGHBOUR_SIZE + 1, np.float32),
-        np.empty((others, LANES), np.int32),
-        np.empty((pairs, LANES), np.intp),
-        np.empty(pairs, np.intp),
+        numbers.reshape(count, -1),
+        numbers32[:known].reshape(count, WORK32_SIZE),
+        numbers32[known:views].reshape(count, neighbours.KNOWN_SIZE),
+        numbers32[views:spare].reshape(count, others, neighbours.VIEW_SIZE),
+        numbers32[spare:lines],
+        numbers32[lines:],
+        integers[: others * LANES].reshape(others, LANES),
+        integers[others * LANES : (others + pairs) * LANES].reshape(pairs, LANES),
+        integers[(others + pairs) * LANES :],
     )
 
 
@@ -189,40 +216,38 @@ def show(
         groups: numbers of the block's groups (n,).
         n: groups.
     """
-    count, starts = len(tiles), np.empty(LANES, np.intp)
+    count, starts, lines = len(tiles), np.empty(LANES, np.intp), np.empty(LANES, np.intp)
+    known, views = scratch.known, scratch.views
     for f in range(count):
-        state, work, work32 = tiles[f, block], scratch.works[f], scratch.works32[f]
-        neighbours.scale(state, work, work32, scratch.known[f], n)
-    for receiver in range(count):
-        work32 = scratch.works32[receiver]
-        observe.observe(tiles[receiver, block], scratch.works[receiver], work32, n)
-        for sender in range(count):
-            if sender != receiver:
-                number = pair(receiver, sender)
-                neighbours.look(
-                    scratch.known[receiver],
-                    scratch.known[sender],
-                    work32,
-                    sent[messages.message(receiver, sender, count) :],
-                    scratch.lanes[number],
-                    scratch.deaf[number],
-                    links[place(number, AGE) :],
-                    gone[sender, block],
-                    scratch.views[sender - int(sender > receiver)],
-                    n,
-                )
-        neighbours.rank(scratch.views, scratch.ranks, n)
+        neighbours.scale(tiles[f, block], scratch.works[f], scratch.works32[f], known[f], n)
+    for a in range(1, count):
+        for c in range(a):
+            number = pair(a, c)
+            lanes, deaf = scratch.lanes[number], scratch.deaf[number]
+            its, age = views[c, a - 1], links[place(number, AGE) :]
+            neighbours.meet(known[a], known[c], scratch.works32[a], age, views[a, c], its, n)
+            for k in range(deaf):
+                lines[k] = messages.line(a, c, count, lanes[k])
+            neighbours.remember(known[a], scratch.works32[a], sent, lines, lanes, deaf, views[a, c], scratch.spare_view)
+            for k in range(deaf):
+                lines[k] = messages.line(c, a, count, lanes[k])
+            neighbours.remember(known[c], scratch.works32[c], sent, lines, lanes, deaf, its, scratch.spare_view)
+            neighbours.miss(gone[c, block], views[a, c], n)
+            neighbours.miss(gone[a, block], its, n)
+    flat = observations.reshape(-1)
+    for f in range(count):
+        observe.observe(tiles[f, block], scratch.works[f], scratch.works32[f], n)
+        neighbours.rank(views[f], scratch.ranks, n)
         for i in range(n):
-            starts[i] = (groups[i] * count + receiver) * observations.shape[1]
-        flat = observations.reshape(-1)
-        neighbours.write(work32, scratch.views, scratch.ranks, scratch.lines, shown, flat, starts, n)
+            starts[i] = (groups[i] * count + f) * observations.shape[1]
+        neighbours.write(scratch.works32[f], views[f], scratch.ranks, scratch.lines, shown, flat, starts, n)
 
 
 # Long: numba takes the arrays one by one, and the order of the stages is best read at one place.
 def _step(kinds: Kinds, sources: str) -> Any:
     """Compile the step."""
     thrust, move, predict, sense, measure, table = stages_of(kinds)
-    coast = kalman_filter.COAST[kinds.filter_model]
+    side_by_side = kinds.filter_model == packing.CONSTANT  # else the model is that of the row's step
 
     @compiled_program("group_step", kinds, sources)
     def step(
@@ -240,6 +265,9 @@ def _step(kinds: Kinds, sources: str) -> Any:
         num_groups: int,
         first: int,
         last: int,
+        scratch64: Array,
+        scratch32: Array32,
+        scratch_integers: Rows,
         actions: Array32,
         observations: Array32,
         results: Array,
@@ -250,7 +278,11 @@ def _step(kinds: Kinds, sources: str) -> Any:
     ) -> int:
         """Fly groups over one step; the arguments are those of `GroupProgram`."""
         count, shown, together = int(rules[0]), int(rules[1]), rules[2] > 0.5
-        scratch, totals = group_scratch(schedule, count), np.empty(STATE_SIZE)
+        scratch, totals, spare = (
+            group_scratch(scratch64, scratch32, scratch_integers, count),
+            np.empty(STATE_SIZE),
+            np.zeros(STATE_SIZE),
+        )
         works, works32, lanes, deaf = scratch.works, scratch.works32, scratch.lanes, scratch.deaf
         known_lines, numbered = np.full(count, -1), np.empty(LANES, np.intp)
         blocks, between = len(states) // count, link_settings(rules)
@@ -263,6 +295,8 @@ def _step(kinds: Kinds, sources: str) -> Any:
                 state, work, work32, row = tiles[f, b], works[f], works32[f], (f * blocks + b) * LANES
                 numbers = packed[f * count : f * count + 1]
                 plan.advance(state, n)
+                if not together:
+                    group.stay(state, absent[f, b], n)
                 known_lines[f] = plan.read_plan(state, work, work32, schedule, seen, known_lines[f], n)
                 noise.draw(streams[f * blocks + b], work32, n)
                 thrust(actions, row, work, work32, numbers, n)
@@ -290,14 +324,17 @@ def _step(kinds: Kinds, sources: str) -> Any:
                 numbers = packed[f * count : f * count + 1]
                 for receiver in range(count):
                     if receiver != f:
-                        number, kept = pair(receiver, f), own_sent[messages.message(receiver, f, count) :]
-                        messages.keep(kept, own_links, number, lanes[number], deaf[number], state, False)
+                        number = pair(receiver, f)
+                        own_lanes, own_deaf = lanes[number], deaf[number]
+                        messages.keep(own_sent, receiver, f, count, own_links, own_lanes, own_deaf, state, False)
                 predict(state, work, numbers, n)
                 messages.no_command(work)
                 for receiver in range(count):
                     if receiver != f:
-                        number, kept = pair(receiver, f), own_sent[messages.message(receiver, f, count) :]
-                        coast(kept, work, numbers, lanes[number], deaf[number])
+                        own_lanes, own_deaf = lanes[pair(receiver, f)], deaf[pair(receiver, f)]
+                        messages.gather(own_sent, receiver, f, count, own_lanes, own_deaf, side_by_side, spare)
+                        predict(spare, work, numbers, whole_vectors(own_deaf) if side_by_side else n)
+                        messages.put_back(own_sent, receiver, f, count, own_lanes, own_deaf, side_by_side, spare)
                 link.receive(state, work, numbers, n)
                 sense(state, work, work32, numbers, n)
                 if len(noises):
@@ -345,6 +382,9 @@ def _reset(kinds: Kinds, sources: str) -> Any:
         slots: NDArray[np.int64],
         starts: Array,
         given: bool,
+        scratch64: Array,
+        scratch32: Array32,
+        scratch_integers: Rows,
         observations: Array32,
         results: Array,
         flags: Flags,
@@ -354,7 +394,7 @@ def _reset(kinds: Kinds, sources: str) -> Any:
     ) -> None:
         """Start the next episode of some groups in a spare block; the arguments are those of `GroupProgram`."""
         count, shown, between = int(rules[0]), int(rules[1]), link_settings(rules)
-        scratch = group_scratch(schedule, count)
+        scratch = group_scratch(scratch64, scratch32, scratch_integers, count)
         works, works32, lanes, deaf = scratch.works, scratch.works32, scratch.lanes, scratch.deaf
         spares, spare_streams = np.empty((count, STATE_SIZE)), np.empty((count, noise.STREAM_SIZE), np.uint32)
         spare_links, spare_sent = np.empty(links.shape[1]), np.empty(sent.shape[1])
@@ -397,8 +437,8 @@ def _reset(kinds: Kinds, sources: str) -> Any:
                 rows = own + f * blocks * LANES
                 for receiver in range(count):
                     if receiver != f:
-                        number, kept = pair(receiver, f), spare_sent[messages.message(receiver, f, count) :]
-                        messages.keep(kept, spare_links, number, lanes[number], deaf[number], spare, True)
+                        own_lanes, own_deaf = lanes[pair(receiver, f)], deaf[pair(receiver, f)]
+                        messages.keep(spare_sent, receiver, f, count, spare_links, own_lanes, own_deaf, spare, True)
                 noise.draw(spare_streams[f], work32, n)
                 link.receive(spare, work, numbers, n)
                 sense(spare, work, work32, numbers, n)
@@ -417,7 +457,11 @@ def _reset(kinds: Kinds, sources: str) -> Any:
             for i in range(n):
                 block, lane = own[i] // LANES, own[i] % LANES
                 links[block, lane::LANES] = spare_links[i::LANES]
-                sent[block, lane::LANES] = spare_sent[i::LANES]
+                for k in range(count * count):
+                    at = k * LANES * messages.MESSAGE_SIZE
+                    to, origin = at + lane * messages.MESSAGE_SIZE, at + i * messages.MESSAGE_SIZE
+                    kept = spare_sent[origin : origin + messages.MESSAGE_SIZE]
+                    sent[block, to : to + messages.MESSAGE_SIZE] = kept
                 link_streams[block, lane::LANES] = spare_link_stream[i::LANES]
             everyone, nobody = spares.reshape(count, 1, STATE_SIZE), nobody_gone.reshape(count, 1, LANES)
             show(scratch, everyone, 0, spare_links, spare_sent, nobody, shown, observations, own, n)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_env.kernel.group_program import Rules, group_program
+from formation_env.kernel.group_program import Rules, group_program, scratch_sizes
 from formation_env.kernel.program import kinds_of
 from formation_env.kernel.reused_arrays import ReusedArrays
 from formation_env.kernel.simulation import Simulation
@@ -55,6 +55,7 @@ class GroupSimulation(Simulation):
         self._of_groups = (self._links, self._sent, self._link_streams, gone, self._rules, self._closed)
         num_parts = min(num_threads, blocks)
         self._parts = list(pairwise(blocks * part // num_parts for part in range(num_parts + 1)))
+        self._scratch = [scratch(self.schedule.shape[2], self.count) for _ in self._parts]
         self._kinds = kinds_of(self.variants[0], 1)._replace(guarded=True)
 
     def seed_group(self, group: int, generator: np.random.Generator) -> None:
@@ -65,6 +66,9 @@ class GroupSimulation(Simulation):
     def rows_of(self, groups: Groups) -> NDArray[np.intp]:
         """Rows (count, k) of the followers of some groups (k,)."""
         return np.arange(self.count)[:, None] * self.padded + groups
+
+    def _flown(self, values: NDArray[Any]) -> NDArray[Any]:
+        return self.by_group(values)
 
     def by_group(self, values: NDArray[Any]) -> NDArray[Any]:
         """A view (num_groups, count, ...) of values of all rows (rows, ...)."""
@@ -106,6 +110,7 @@ class GroupSimulation(Simulation):
             flown,
             np.ascontiguousarray(begun, float),
             given,
+            *self._scratch[0],
             observations,
             *self.results.blocks,
         )
@@ -113,10 +118,11 @@ class GroupSimulation(Simulation):
         self._begin_safety(self.rows_of(groups).ravel())
 
     def arguments(self, observations: Array32, first: int = 0, last: int | None = None) -> tuple[Any, ...]:
-        """Arguments of `fly` for the blocks from first to last - 1, see `Simulation.arguments`."""
+        """Arguments of `fly` for the blocks of a part, see `Simulation.arguments`."""
         last = len(self._links) if last is None else last
+        own = self._scratch[self._parts.index((first, last))]
         outputs = (self.actions, observations, *self.results.blocks)
-        return (*self._arrays, *self._of_groups, self.num_groups, first, last, *outputs)
+        return (*self._arrays, *self._of_groups, self.num_groups, first, last, *own, *outputs)
 
     def fly(self, arguments: tuple[Any, ...]) -> int:
         """Fly some blocks over one step in this thread; returns how many groups ended."""
@@ -128,6 +134,12 @@ class GroupSimulation(Simulation):
             *super()._remembered(),
             *(part.view(np.float64) for part in (self._links, self._sent, self._link_streams, self.gone, self.slots)),
         ]
+
+
+def scratch(columns: int, count: int) -> tuple[Array, Array32, NDArray[np.intp]]:
+    """Scratch space of a thread; see `group_program.scratch_sizes`."""
+    size64, size32, size_integers = scratch_sizes(columns, count)
+    return np.zeros(size64), np.zeros(size32, np.float32), np.zeros(size_integers, np.intp)
 
 
 def rules(scenario: Scenario) -> tuple[Array, Array]:

@@ -123,9 +123,13 @@ class Simulation:
     def count_safety(self) -> None:
         """Add the last step to the totals of safety; `step` does so itself, `fly` does not."""
         if self.guarded:
-            costs, least = self.safety_totals
-            costs += self.results["cost"]
-            np.minimum(least, self.results["least_distance"], out=least)
+            costs, least = map(self._flown, self.safety_totals)
+            costs += self._flown(self.results["cost"])
+            np.minimum(least, self._flown(self.results["least_distance"]), out=least)
+
+    def _flown(self, values: NDArray[Any]) -> NDArray[Any]:
+        """A view of the values (rows, ...) of all rows that fly."""
+        return values
 
     def step(self, observations: Array32) -> int:
         """Fly all rows over one step with `actions`, and put new `results`.

@@ -47,6 +47,12 @@ def tile_function(function: F) -> F:
 
 
 @inline_scalar
+def whole_vectors(count: int) -> int:
+    """A number of rows, up to whole vectors of any processor: fewer rows than a vector has are computed one by one."""
+    return (count + 15) // 16 * 16
+
+
+@inline_scalar
 def turns(count: int, array: Any) -> int:
     """A number of turns of a loop over fields, such that the compiler does not know it and writes the loop once.
 

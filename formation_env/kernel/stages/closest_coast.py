@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from formation_env.numerics.arrays import Array32
+from formation_env.numerics.fastmath import fma
 from formation_env.numerics.jit import LANES, inline_scalar, tile_function
 from formation_env.numerics.single_precision import cos_sin
 
@@ -49,10 +50,10 @@ def _coast(x: np.float32, y: np.float32, z: np.float32, u: np.float32, v: np.flo
 @inline_scalar
 def _square(o: Coast, cosine: np.float32, sine: np.float32, time: np.float32) -> np.float32:
     """Squared distance."""
-    x = o.x1 + cosine * o.xc + sine * o.xs
-    y = o.y1 + cosine * o.yc + sine * o.ys + time * o.yt
-    z = cosine * o.zc + sine * o.zs
-    return x * x + y * y + z * z
+    x = fma(cosine, o.xc, fma(sine, o.xs, o.x1))
+    y = fma(cosine, o.yc, fma(sine, o.ys, fma(time, o.yt, o.y1)))
+    z = fma(cosine, o.zc, sine * o.zs)
+    return fma(x, x, fma(y, y, z * z))
 
 
 @inline_scalar
@@ -69,11 +70,12 @@ def _newton(o: Coast, t: np.float32, low: np.float32, high: np.float32) -> np.fl
     late = t - _QUARTER
     sine, minus_cosine = cos_sin(late)
     cosine = -minus_cosine
-    cx, sx, cy, sy, cz, sz = cosine * o.xc, sine * o.xs, cosine * o.yc, sine * o.ys, cosine * o.zc, sine * o.zs
-    x, y, z = o.x1 + cx + sx, o.y1 + cy + sy + t * o.yt, cz + sz
-    u, v, w = cosine * o.xs - sine * o.xc, cosine * o.ys - sine * o.yc + o.yt, cosine * o.zs - sine * o.zc
-    slope = x * u + y * v + z * w
-    bend = u * u + v * v + w * w - x * (cx + sx) - y * (cy + sy) - z * z
+    p, q, z = fma(cosine, o.xc, sine * o.xs), fma(cosine, o.yc, sine * o.ys), fma(cosine, o.zc, sine * o.zs)
+    x, y = o.x1 + p, fma(t, o.yt, o.y1 + q)
+    u, w = fma(cosine, o.xs, -sine * o.xc), fma(cosine, o.zs, -sine * o.zc)
+    v = fma(cosine, o.ys, fma(-sine, o.yc, o.yt))
+    slope = fma(x, u, fma(y, v, z * w))
+    bend = fma(u, u, fma(v, v, w * w)) - fma(x, p, fma(y, q, z * z))
     moved = t - slope / (bend if bend > _ZERO else _ONE)
     return min(max(moved if bend > _ZERO else t, low), high)
 

@@ -62,6 +62,13 @@ def end_together(works: Array, n: int) -> None:
 
 
 @tile_function
+def stay(state: Array, gone: Array, n: int) -> None:
+    """Do not count the steps of followers whose episodes have ended."""
+    for i in range(n):
+        state[STATE.step + i] -= gone[i]
+
+
+@tile_function
 def set_aside(state: Array, gone: Array, totals: Array, n: int) -> None:
     """Keep the totals of followers whose episodes have ended."""
     for i in range(n):

@@ -1,8 +1,5 @@
 """The Kalman filter of a row (see `kalman`)."""
 
-import numpy as np
-from numpy.typing import NDArray
-
 from formation_env.kernel import kalman
 from formation_env.kernel.settings import FILTER, Model, ProcessNoise, model, process_noise, scalars
 from formation_env.kernel.stages.linear_model import propagate
@@ -54,22 +51,6 @@ def predict_varying(state: Array, work: Array, settings: Array, n: int) -> None:
         time_update(state, work, i, model(work, MODELS, i), process_noise(work, MODELS, i))
     for i in range(min(n, LANES)):
         doubt_thrust(state, work, i, model(work, MODELS, i), scalars(settings, i).filter_thrust_variance)
-
-
-@tile_function
-def coast_constant(state: Array, work: Array, settings: Array, lanes: NDArray[np.intp], count: int) -> None:
-    """Update some rows in time by the model that the settings hold."""
-    for k in range(count):
-        i = lanes[k]
-        time_update(state, work, i, model(settings, FILTER, i), process_noise(settings, FILTER, i))
-
-
-@tile_function
-def coast_varying(state: Array, work: Array, settings: Array, lanes: NDArray[np.intp], count: int) -> None:
-    """Update some rows in time by the model of their step."""
-    for k in range(count):
-        i = lanes[k]
-        time_update(state, work, i, model(work, MODELS, i), process_noise(work, MODELS, i))
 
 
 @inline_scalar
@@ -167,7 +148,5 @@ def _store_10(state: Array, k: int, P: kalman.Symmetric4) -> None:
 
 PREDICT = {"constant": predict_constant, "varying": predict_varying}
 """The compiled time update of each kind of the filter's model."""
-COAST = {"constant": coast_constant, "varying": coast_varying}
-"""The compiled time update of some rows, by the kind of the filter's model."""
 MEASURE = {"position": measure_position, "position_and_velocity": measure_position_and_velocity}
 """The compiled measurement update of each kind of sensor."""

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from formation_env.kernel.stages.closest_coast import closest_coast
+from formation_env.kernel.stages.messages import VARIANCES
 from formation_env.kernel.stages.observe import (
     BOUND,
     ONE,
@@ -21,12 +22,11 @@ from formation_env.kernel.stages.observe import (
 from formation_env.kernel.stages.plan import eight_from
 from formation_env.kernel.tile import STATE, WORK32
 from formation_env.numerics.arrays import Array, Array32
-from formation_env.numerics.jit import LANES, inline_scalar, tile_function
+from formation_env.numerics.jit import LANES, inline_scalar, tile_function, whole_vectors
 from formation_env.numerics.single_precision import log
 from formation_env.numerics.transpose import BLOCK, transpose_block
 from formation_env.task.observation import NEIGHBOUR_SIZE, NEIGHBOUR_SLICES, SIZE
 
-Ranks = NDArray[np.int32]
 Lanes = NDArray[np.intp]
 
 
@@ -45,6 +45,8 @@ VIEW_SIZE: Final = NEIGHBOUR_SIZE * LANES
 KNOWN_SIZE: Final = 13 * LANES
 """Scratch space of what followers know of one another: scaled estimate and reference, and the position's variance."""
 VARIANCE: Final = 12 * LANES
+NUM_RELATIVE: Final = NEIGHBOUR_SLICES["closest_distance"].start
+"""How many numbers have opposite signs for the other; those behind are equal for both."""
 ZERO: Final = np.float32(0)
 FAR: Final = np.float32(1e30)
 
@@ -80,58 +82,32 @@ def scale(state: Array, work: Array, work32: Array32, known: Array32, n: int) ->
 
 
 @tile_function
-def _differences(known: Array32, other: Array32, view: Array32, n: int) -> None:
-    """Relative estimate and reference, and the variance of the relative position, of two that hear each other."""
-    for k in range(12):
-        own, its, relative = known[k * LANES :], other[k * LANES :], view[k * LANES :]
+def _differences(known: Array32, other: Array32, view: Array32, its_view: Array32, n: int) -> None:
+    """Relative estimate and reference of two that hear each other, as either sees them, and their variance."""
+    for k in range(NUM_RELATIVE):
+        own, its, relative, opposite = known[k * LANES :], other[k * LANES :], view[k * LANES :], its_view[k * LANES :]
         for i in range(min(n, LANES)):
             relative[i] = min(max(its[i] - own[i], -BOUND), BOUND)
+        for i in range(min(n, LANES)):
+            opposite[i] = -relative[i]
     for i in range(min(n, LANES)):
         view[SIGMA + i] = known[VARIANCE + i] + other[VARIANCE + i]
 
 
 @tile_function
-def _by_message(known: Array32, work32: Array32, message: Array, lanes: Lanes, count: int, view: Array32) -> None:
-    """The same by the last message, in the groups where the receiver does not hear the sender."""
-    for at in range(count):
-        i = lanes[at]
-        for k in range(6):
-            per_unit = work32[(PER_LENGTH if k < 3 else PER_SPEED) + i]
-            estimate = per_unit * np.float32(message[STATE.estimate + k * LANES + i])
-            view[ESTIMATE + k * LANES + i] = min(max(estimate - known[k * LANES + i], -BOUND), BOUND)
-        view[SIGMA + i] = known[VARIANCE + i] + _variance(message, i)
-
-
-# Long: its arguments.
-@tile_function
-def look(
-    known: Array32,
-    other: Array32,
-    work32: Array32,
-    message: Array,
-    lanes: Lanes,
-    deaf: int,
-    age: Array,
-    gone: Array,
-    view: Array32,
-    n: int,
-) -> None:
-    """Compute what a follower sees of another.
+def meet(known: Array32, other: Array32, work32: Array32, age: Array, view: Array32, its_view: Array32, n: int) -> None:
+    """Compute what two followers see of each other where they hear each other.
 
     Args:
-        known: of the one who looks, see `scale`.
+        known: of the one, see `scale`.
         other: of the other.
         work32: scratch space with the scales.
-        message: the messages that it has of the other.
-        lanes: groups in which they do not hear each other.
-        deaf: how many these are.
-        age: of the last message, s (LANES,).
-        gone: 1 where the other's episode has ended (LANES,).
-        view: written (VIEW_SIZE,).
+        age: of the last messages, s (LANES,).
+        view: what the one sees, written (VIEW_SIZE,).
+        its_view: what the other sees, written.
         n: groups.
     """
-    _differences(known, other, view, n)
-    _by_message(known, work32, message, lanes, deaf, view)
+    _differences(known, other, view, its_view, n)
     closest_coast(view[ESTIMATE:], view[DISTANCE:], view[TIME:], n)
     for i in range(min(n, LANES)):
         view[SIGMA + i] = PER_LOG_SIGMA * log(max(view[SIGMA + i], VARIANCE_FLOOR))
@@ -139,15 +115,59 @@ def look(
         view[MESSAGE_AGE + i] = work32[PER_LOG_AGE + i] * log(ONE + work32[PER_STEP + i] * np.float32(age[i]))
     for i in range(min(n, LANES)):
         view[PRESENT + i] = ONE
+    for k in range(NUM_RELATIVE, NEIGHBOUR_SIZE):
+        own, its = view[k * LANES :], its_view[k * LANES :]
+        for i in range(min(n, LANES)):
+            its[i] = own[i]
+
+
+@tile_function
+def remember(
+    known: Array32, work32: Array32, sent: Array, lines: Lanes, lanes: Lanes, count: int, view: Array32, spare: Array32
+) -> None:
+    """Compute what a follower sees of another by its last message, where they do not hear each other.
+
+    Args:
+        known: of the one who looks, see `scale`.
+        work32: scratch space with the scales.
+        sent: messages of the block.
+        lines: where the messages begin (count,).
+        lanes: groups in which they do not hear each other (count,).
+        count: how many these are.
+        view: written in these groups.
+        spare: scratch space of the size of a view.
+    """
+    for k in range(count):
+        i, message = lanes[k], sent[lines[k] :]
+        for axis in range(6):
+            per_unit = work32[(PER_LENGTH if axis < 3 else PER_SPEED) + i]
+            estimate = per_unit * np.float32(message[axis])
+            spare[axis * LANES + k] = min(max(estimate - known[axis * LANES + i], -BOUND), BOUND)
+        variance = message[VARIANCES[0]] + message[VARIANCES[1]] + message[VARIANCES[2]]
+        spare[SIGMA + k] = known[VARIANCE + i] + np.float32(PER_VARIANCE_POS * variance)
+    whole = whole_vectors(count)
+    closest_coast(spare, spare[DISTANCE:], spare[TIME:], whole)
+    for k in range(min(whole, LANES)):
+        spare[SIGMA + k] = PER_LOG_SIGMA * log(max(spare[SIGMA + k], VARIANCE_FLOOR))
+    for k in range(count):
+        i = lanes[k]
+        for axis in range(6):
+            view[ESTIMATE + axis * LANES + i] = spare[axis * LANES + k]
+        view[DISTANCE + i], view[TIME + i], view[SIGMA + i] = spare[DISTANCE + k], spare[TIME + k], spare[SIGMA + k]
+
+
+@tile_function
+def miss(gone: Array, view: Array32, n: int) -> None:
+    """Show nothing of a follower whose episode has ended, but rank it behind all others."""
     for i in range(n):
         if gone[i] > 0.0:
             for k in range(NEIGHBOUR_SIZE):
                 view[k * LANES + i] = ZERO
-            view[DISTANCE + i] = FAR  # for the rank
+            view[DISTANCE + i] = FAR
 
 
 @tile_function
-def rank(views: Array32, ranks: Ranks, n: int) -> None:
+def rank(views: Array32, ranks: Lanes, n: int) -> None:
     """Place of each neighbour in the observation: the least predicted distance first, those that are gone last.
 
     Args:
@@ -161,17 +181,54 @@ def rank(views: Array32, ranks: Ranks, n: int) -> None:
             mine, its = views[a, DISTANCE:], views[b, DISTANCE:]
             first, second = ranks[a], ranks[b]
             for i in range(min(n, LANES)):
-                later = np.int32(its[i] < mine[i])
+                later = np.intp(its[i] < mine[i])
                 first[i] += later
-                second[i] += np.int32(1) - later
+                second[i] += 1 - later
     for a in range(len(views)):
         distance = views[a, DISTANCE:]
         for i in range(min(n, LANES)):
             distance[i] = distance[i] if distance[i] < FAR else ZERO
 
 
+@inline_scalar
+def _eight(places: Lanes, i: int, k: int) -> tuple[int, ...]:
+    """Eight neighbouring places, moved by k."""
+    return (
+        places[i] + k,
+        places[i + 1] + k,
+        places[i + 2] + k,
+        places[i + 3] + k,
+        places[i + 4] + k,
+        places[i + 5] + k,
+        places[i + 6] + k,
+        places[i + 7] + k,
+    )
+
+
 @tile_function
-def collect(views: Array32, ranks: Ranks, target: Array32, starts: Lanes, n: int) -> None:
+def write_lines(fields: Array32, first: int, size: int, target: Array32, places: Lanes, n: int) -> None:
+    """Write neighbouring fields of each row side by side.
+
+    Args:
+        fields: of LANES numbers each.
+        first: offset of the first.
+        size: how many they are, 8 at least.
+        target: flat.
+        places: where each row's numbers go (LANES,).
+        n: rows.
+    """
+    whole = n - n % BLOCK
+    for i in range(0, whole, BLOCK):
+        for begin in range(0, size, BLOCK):
+            k = min(begin, size - BLOCK)
+            transpose_block(fields, eight_from(first + k * LANES + i, LANES), target, _eight(places, i, k))
+    for i in range(whole, n):
+        for k in range(size):
+            target[places[i] + k] = fields[first + k * LANES + i]
+
+
+@tile_function
+def collect(views: Array32, ranks: Lanes, target: Array32, starts: Lanes, n: int) -> None:
     """Write what each row sees of its neighbours, in the order of their ranks.
 
     Args:
@@ -181,61 +238,17 @@ def collect(views: Array32, ranks: Ranks, target: Array32, starts: Lanes, n: int
         starts: where each row's neighbours go (LANES,).
         n: groups.
     """
-    whole = n - n % BLOCK
+    places = np.empty(LANES, np.intp)
     for neighbour in range(len(views)):
-        view, own = views[neighbour], ranks[neighbour]
-        for i in range(0, whole, BLOCK):
-            places = (
-                starts[i] + int(own[i]) * NEIGHBOUR_SIZE,
-                starts[i + 1] + int(own[i + 1]) * NEIGHBOUR_SIZE,
-                starts[i + 2] + int(own[i + 2]) * NEIGHBOUR_SIZE,
-                starts[i + 3] + int(own[i + 3]) * NEIGHBOUR_SIZE,
-                starts[i + 4] + int(own[i + 4]) * NEIGHBOUR_SIZE,
-                starts[i + 5] + int(own[i + 5]) * NEIGHBOUR_SIZE,
-                starts[i + 6] + int(own[i + 6]) * NEIGHBOUR_SIZE,
-                starts[i + 7] + int(own[i + 7]) * NEIGHBOUR_SIZE,
-            )
-            for begin in range(0, NEIGHBOUR_SIZE, BLOCK):
-                k = min(begin, NEIGHBOUR_SIZE - BLOCK)
-                transpose_block(view[k * LANES + i :], eight_from(0, LANES), target[k:], places)
-        for i in range(whole, n):
-            for k in range(NEIGHBOUR_SIZE):
-                target[starts[i] + int(own[i]) * NEIGHBOUR_SIZE + k] = view[k * LANES + i]
-
-
-@tile_function
-def write_own(work32: Array32, target: Array32, starts: Lanes, n: int) -> None:
-    """Write each row's own part of the observation.
-
-    Args:
-        work32: scratch space with it.
-        target: flat.
-        starts: where it goes (LANES,).
-        n: groups.
-    """
-    whole = n - n % BLOCK
-    for i in range(0, whole, BLOCK):
-        places = (
-            starts[i],
-            starts[i + 1],
-            starts[i + 2],
-            starts[i + 3],
-            starts[i + 4],
-            starts[i + 5],
-            starts[i + 6],
-            starts[i + 7],
-        )
-        for begin in range(0, SIZE, BLOCK):
-            k = min(begin, SIZE - BLOCK)
-            transpose_block(work32[WORK32.observation + k * LANES + i :], eight_from(0, LANES), target[k:], places)
-    for i in range(whole, n):
-        for k in range(SIZE):
-            target[starts[i] + k] = work32[WORK32.observation + k * LANES + i]
+        own = ranks[neighbour]
+        for i in range(min(n, LANES)):
+            places[i] = starts[i] + own[i] * NEIGHBOUR_SIZE
+        write_lines(views[neighbour], 0, NEIGHBOUR_SIZE, target, places, n)
 
 
 @tile_function
 def write(
-    work32: Array32, views: Array32, ranks: Ranks, lines: Array32, shown: int, target: Any, starts: Lanes, n: int
+    work32: Array32, views: Array32, ranks: Lanes, lines: Array32, shown: int, target: Any, starts: Lanes, n: int
 ) -> None:
     """Write observations.
 
@@ -249,9 +262,9 @@ def write(
         starts: where those of the rows begin (LANES,).
         n: groups.
     """
-    write_own(work32, target, starts, n)
+    write_lines(work32, WORK32.observation, SIZE, target, starts, n)
     if shown == len(views):
-        collect(views, ranks, target[SIZE:], starts, n)
+        collect(views, ranks, target, starts + SIZE, n)
     else:
         width = len(views) * NEIGHBOUR_SIZE
         collect(views, ranks, lines, np.arange(LANES) * width, n)
