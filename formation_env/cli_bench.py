@@ -114,10 +114,10 @@ def compile_programs(envs: Envs = None) -> None:
     The cache holds the code for this processor, this version of numba and these source files.
     """
     from formation_env.evaluation.fill_cache import fill_cache
-    from formation_env.registration import ENV_IDS
+    from formation_env.registration import ENV_IDS, SWARM_IDS
     from formation_env.task.loading import load_scenario
 
-    chosen: Sequence[str] = envs or tuple(ENV_IDS)
+    chosen: Sequence[str] = envs or (*ENV_IDS, *SWARM_IDS)
     for env in chosen:
         load_scenario(env)
     folder = None

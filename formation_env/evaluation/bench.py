@@ -14,13 +14,15 @@ import pandas as pd
 
 from formation_env.evaluation import rivals
 from formation_env.evaluation.rivals import ACTIONS, Stepper
-from formation_env.registration import ENV_IDS
+from formation_env.registration import ENV_IDS, SWARM_IDS
+from formation_env.task.loading import load_scenario
+from formation_env.task.scenario import Scenario
 
 REFERENCE: Final = "CartPole-v1"
 """The environment that the ratios refer to."""
 REFERENCES: Final = (REFERENCE, "Pendulum-v1")
 """Gymnasium's environments measured beside ours."""
-DEFAULT: Final = (*ENV_IDS, "keeping_nonlinear")
+DEFAULT: Final = (*ENV_IDS, "keeping_nonlinear", *SWARM_IDS)
 """Environments that are measured unless others are named."""
 _SINGLE_STEPS: Final = 3000
 _BATCH_STEPS: Final = 400
@@ -29,7 +31,7 @@ _BATCH_ROUNDS: Final = 3
 
 
 def single_stepper(env: str, steps: int) -> Stepper:
-    """A function that steps one environment made with `gymnasium.make`, and returns the number of steps.
+    """A function that steps one environment made with `gymnasium.make`, and returns the steps of all its followers.
 
     Args:
         env: a registered id, of Gymnasium's too, or a scenario's name or path.
@@ -39,6 +41,7 @@ def single_stepper(env: str, steps: int) -> Stepper:
     made: gymnasium.Env[Any, Any] = gymnasium.make(env_id, **arguments)
     made.reset(seed=0)
     made.action_space.seed(0)
+    count = load_scenario(env).followers if env_id in SWARM_IDS else 1
     actions = itertools.cycle([made.action_space.sample() for _ in range(ACTIONS)])
 
     def run() -> int:
@@ -46,29 +49,35 @@ def single_stepper(env: str, steps: int) -> Stepper:
             _, _, terminated, truncated, _ = made.step(action)
             if terminated or truncated:
                 made.reset()
-        return steps
+        return steps * count
 
     return run
 
 
 def batch_stepper(
-    env: str, rows: int, steps: int, thrust: float = 1.0, num_threads: int | None = None, begins: bool = False
+    env: str | Scenario,
+    rows: int,
+    steps: int,
+    thrust: float = 1.0,
+    num_threads: int | None = None,
+    begins: bool = False,
 ) -> Stepper:
     """A function that steps a batched environment, and returns the number of steps of all rows.
 
     Args:
-        env: as of `single_stepper`.
-        rows: rows of the batch.
+        env: as of `single_stepper`, or a scenario.
+        rows: rows of the batch: followers, of several in each group.
         steps: steps per call.
         thrust: greatest random action, of ours.
         num_threads: threads of ours; None: a number that suits the rows.
         begins: whether each call begins with a reset of all rows.
     """
     env_id, arguments = _made_of(env)
-    is_ours = env_id in ENV_IDS
+    is_ours = env_id in ENV_IDS or env_id in SWARM_IDS
+    count = load_scenario(arguments.get("scenario", env_id)).followers if is_ours else 1
     if is_ours:
         arguments["num_threads"] = num_threads
-    made = gymnasium.make_vec(env_id, rows, vectorization_mode="vector_entry_point", **arguments)
+    made = gymnasium.make_vec(env_id, rows // count, vectorization_mode="vector_entry_point", **arguments)
     made.reset(seed=0)
     made.action_space.seed(0)
     samples = [made.action_space.sample() for _ in range(min(ACTIONS, steps))]
@@ -84,9 +93,12 @@ def batch_stepper(
     return run
 
 
-def _made_of(env: str) -> tuple[str, dict[str, Any]]:
+def _made_of(env: str | Scenario) -> tuple[str, dict[str, Any]]:
     """The id and the arguments that make an environment."""
-    return (env, {}) if env in gymnasium.registry else (next(iter(ENV_IDS)), {"scenario": env})
+    if isinstance(env, str) and env in gymnasium.registry:
+        return env, {}
+    ids = SWARM_IDS if load_scenario(env).followers > 1 else ENV_IDS
+    return next(iter(ids)), {"scenario": env}
 
 
 def rates(steppers: dict[str, Stepper], rounds: int = _ROUNDS) -> dict[str, float]:
@@ -137,7 +149,7 @@ def beside_rivals(env: str) -> tuple[pd.DataFrame, list[str]]:
 
 
 def table(rows: int, envs: Sequence[str] = DEFAULT) -> pd.DataFrame:
-    """Steps per second, and their ratio to CartPole's, single and in a batch.
+    """Steps per second of all followers, and their ratio to CartPole's, single and in a batch.
 
     The actions are random, and the steps span whole episodes, so the time of resets is included.
 

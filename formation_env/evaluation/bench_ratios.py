@@ -8,10 +8,14 @@ from formation_env.evaluation.bench import REFERENCE, batch_stepper, rates, sing
 from formation_env.evaluation.rivals import Stepper
 from formation_env.evaluation.rollout import Policy, evaluate
 from formation_env.kernel.threads import usable_cpus
+from formation_env.task.loading import load_scenario
+from formation_env.task.members import members
 from formation_env.task.scenario import Scenario
 
 ROWS: Final = (1024, 4096, 65_536)
 """Batches that are measured."""
+SWARM: Final = "swap"
+SWARM_GROUPS: Final = 512
 NONLINEAR: Final = "keeping_nonlinear"
 _SMALL_THRUST: Final = 1e-3
 """Share of the full thrust with which hardly an episode ends before its plan does."""
@@ -74,6 +78,19 @@ def ratios(env: str, policy: Policy, scenario: Scenario, rounds: int = _ROUNDS) 
         yield Line(case.name, 1e9 / best["ours"], case.reference, best["ours"] / best["reference"])
 
 
+def _swarm_case(num_threads: int | None) -> Case:
+    """Groups of followers beside as many followers alone."""
+    scenario = load_scenario(SWARM)
+    rows = SWARM_GROUPS * scenario.followers
+    threads = "" if num_threads is None else ", 1 thread"
+    return Case(
+        f"{SWARM}, {SWARM_GROUPS} groups of {scenario.followers}{threads}",
+        batch_stepper(SWARM, rows, _STEPS, _SMALL_THRUST, num_threads),
+        f"one follower of it, {rows} rows",
+        batch_stepper(members(scenario)[0][0], rows, _STEPS, _SMALL_THRUST, num_threads),
+    )
+
+
 def _cases(env: str, policy: Policy, scenario: Scenario) -> Iterator[Callable[[], Case]]:
     """What makes each case, when its turn has come: large batches shall not all be in memory."""
     for num_threads in (1, 2) if len(usable_cpus()) > 1 else (1,):
@@ -81,6 +98,8 @@ def _cases(env: str, policy: Policy, scenario: Scenario) -> Iterator[Callable[[]
             yield partial(_from_the_start, env, rows, num_threads)
     yield partial(_in_flight, env, ROWS[1], scenario.num_steps)
     yield partial(_from_the_start, NONLINEAR, ROWS[1], 1)
+    yield partial(_swarm_case, 1)
+    yield partial(_swarm_case, None)
     yield lambda: Case(
         "a single environment", single_stepper(env, _SINGLE_STEPS), REFERENCE, single_stepper(REFERENCE, _SINGLE_STEPS)
     )

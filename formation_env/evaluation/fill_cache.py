@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from numba.core.dispatcher import Dispatcher
 
+from formation_env.kernel.group_program import group_dispatchers, group_kinds, group_program
 from formation_env.kernel.program import dispatchers, kinds_of, look, look_dispatcher, program
 from formation_env.task.loading import load_scenario
 from formation_env.task.variants import draw_variants
@@ -38,13 +39,19 @@ def fill_cache(env: str) -> Filled:
         RuntimeError: numba compiles nothing because NUMBA_DISABLE_JIT is set.
     """
     scenario = load_scenario(env)
-    kinds = kinds_of(scenario, len(draw_variants(scenario)))
-    functions = {**dispatchers(kinds)._asdict(), "look": look_dispatcher()}
+    alone = scenario.followers == 1
+    kinds = kinds_of(scenario, len(draw_variants(scenario))) if alone else group_kinds(scenario)
+    functions: dict[str, Any] = (dispatchers if alone else group_dispatchers)(kinds)._asdict()
+    if alone:
+        functions["look"] = look_dispatcher()
     if not all(isinstance(function, Dispatcher) for function in functions.values()):
         raise RuntimeError("nothing is compiled while NUMBA_DISABLE_JIT is set")
     before = {name: _count(function) for name, function in functions.items()}
     start = time.perf_counter()
-    program(kinds), look()
+    if alone:
+        program(kinds), look()
+    else:
+        group_program(kinds)
     seconds = time.perf_counter() - start
     folder = functions["step"].stats.cache_path
     origins = {name: _origin(before[name], _count(function)) for name, function in functions.items()}

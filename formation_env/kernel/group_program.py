@@ -17,6 +17,7 @@ from formation_env.kernel.program import (
     Kinds,
     Rows,
     Streams,
+    kinds_of,
     source_hash,
     stages_of,
 )
@@ -41,7 +42,9 @@ from formation_env.kernel.stages.memory import Flags, Integers
 from formation_env.kernel.tile import STATE, STATE_SIZE, WORK, WORK32_SIZE, WORK_SIZE
 from formation_env.numerics.arrays import Array, Array32
 from formation_env.numerics.jit import LANES, compiled_program, entry_point, tile_function, whole_vectors
+from formation_env.task.members import members
 from formation_env.task.observation import NEIGHBOUR_SIZE
+from formation_env.task.scenario import Scenario
 from formation_env.task.schedule import WIDTH
 
 
@@ -104,6 +107,11 @@ class GroupProgram(NamedTuple):
 
     step: Any
     reset: Any
+
+
+def group_kinds(scenario: Scenario) -> Kinds:
+    """The kinds that a scenario of several followers needs."""
+    return kinds_of(members(scenario)[0][0], 1)._replace(guarded=True)
 
 
 @cache

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_env.kernel.group_program import Rules, group_program, scratch_sizes
-from formation_env.kernel.program import kinds_of
+from formation_env.kernel.group_program import Rules, group_kinds, group_program, scratch_sizes
 from formation_env.kernel.reused_arrays import ReusedArrays
 from formation_env.kernel.simulation import Simulation
 from formation_env.kernel.stages.inter_satellite_link import PAIR_SIZE, LinkSettings
@@ -56,7 +55,7 @@ class GroupSimulation(Simulation):
         num_parts = min(num_threads, blocks)
         self._parts = list(pairwise(blocks * part // num_parts for part in range(num_parts + 1)))
         self._scratch = [scratch(self.schedule.shape[2], self.count) for _ in self._parts]
-        self._kinds = kinds_of(self.variants[0], 1)._replace(guarded=True)
+        self._kinds = group_kinds(scenario)
 
     def seed_group(self, group: int, generator: np.random.Generator) -> None:
         """Give the followers of a group new random streams; its next episode is their first."""
