@@ -144,12 +144,16 @@ def show_observation(
 ) -> None:
     """Print the table of the observation's elements: meaning, unit and scale."""
     from formation_env.task.loading import load_scenario
-    from formation_env.task.observation import markdown_table, observation_layout
+    from formation_env.task.observation import NEIGHBOUR_BLOCKS, markdown_table, observation_layout
 
     scenario = None if env is None else load_scenario(env)
     typer.echo(markdown_table())
     if scenario is not None:
         layout = observation_layout(scenario)
+        if layout.num_neighbours:
+            typer.echo(
+                f"\nBehind it, for each of {layout.num_neighbours} neighbours:\n\n{markdown_table(NEIGHBOUR_BLOCKS)}"
+            )
         typer.echo(
             f"\nL = {layout.length_m:g} m, n = {layout.mean_motion_rad_s:.6g} rad/s, "
             f"period = {layout.period_s:.6g} s, dt = {scenario.dt_s:g} s, phases = {layout.num_phases}"

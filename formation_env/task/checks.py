@@ -140,6 +140,12 @@ def check_followers(count: int, own: Sequence[FollowerSettings], neighbours: int
         raise ValueError(f"domain_randomization: is for a single follower, got followers = {count}")
 
 
+def check_alike(key: str, own: str, others: str) -> None:
+    """Refuse a follower whose sensor or filter is of another kind than the group's: all are computed side by side."""
+    if own != others:
+        raise ValueError(f"{key}: must be of the group's kind, {others}, got {own}")
+
+
 def check_slots(start: Start, phases: Sequence[Phase], count: int, safety: Safety, orbit: Orbit, dt_s: float) -> None:
     """Refuse formations without a slot for each follower, and slots that come too near to each other or the leader."""
     places = [

@@ -19,6 +19,7 @@ from formation_env.orbital.orbit import Orbit
 from formation_env.quantities import Acceleration, PositiveDistance
 from formation_env.settings import ConfigError, Positive, Text, faults_of, settings
 from formation_env.task.checks import (
+    check_alike,
     check_durations,
     check_followers,
     check_memory,
@@ -124,9 +125,11 @@ class Scenario:
         check_slots(self.start, self.phases, self.followers, self.safety, self.orbit, self.dt_s)
         for follower in range(self.followers):
             try:
-                self.follower_alone(follower, follower)
+                alone = self.follower_alone(follower, follower)
             except ConfigError as error:
                 raise ValueError(f"follower {follower}: {faults_of(error)}") from None
+            check_alike(f"follower_settings.{follower}", alone.sensor.measures, self.sensor.measures)
+            check_alike(f"follower_settings.{follower}", alone.filter_model.dynamics, self.filter_model.dynamics)
         self.inter_satellite_link.dropout.chain(self.dt_s, self.orbit)
 
     def follower_alone(self, follower: int, slot: int) -> Self:

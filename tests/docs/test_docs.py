@@ -25,7 +25,7 @@ from formation_env.evaluation.seeds import seeds
 from formation_env.formations import FORMATIONS
 from formation_env.kernel.metrics import METRICS
 from formation_env.settings import build
-from formation_env.task.observation import markdown_table
+from formation_env.task.observation import NEIGHBOUR_BLOCKS, markdown_table
 from formation_env.task.phases import Phase
 from formation_env.task.randomization import DomainRandomization
 
@@ -126,8 +126,9 @@ def test_the_readmes_episode_is_typical(capsys: pytest.CaptureFixture[str]) -> N
 
 
 def test_observation_table_is_the_layout() -> None:
-    """The table is the one that `formation-env env show-observation` prints, letter for letter."""
+    """The tables are those that `formation-env env show-observation` prints, letter for letter."""
     assert markdown_table() in PAGES["docs/environment.md"]
+    assert markdown_table(NEIGHBOUR_BLOCKS) in PAGES["docs/swarms.md"]
 
 
 def test_environments_have_the_steps_that_the_table_says() -> None:

@@ -45,6 +45,10 @@ FOLLOWING = {"kind": "following", "y0_m": 300}
         ),
         ({"neighbours": 8}, "neighbours: each of 8 followers has 7, got 8"),
         ({"follower_settings": [{}]}, "follower_settings: must have 8, one for each follower, or none, got 1"),
+        (
+            {"follower_settings": [{}, {"sensor": {"measures": "position"}}] + [{}] * 6},
+            "follower_settings.1: must be of the group's kind, position_and_velocity, got position",
+        ),
         ({"slots": "drawn"}, "slots: must be 'fixed' or 'random', got the string 'drawn'"),
         (
             {"safety": {"min_distance_m": 100, "collision_distance_m": 200}},
