@@ -75,8 +75,11 @@ class GroupSimulation(Simulation):
 
     def rewards(self) -> Array:
         """Mean reward of the followers of each group in the last step (num_groups,)."""
-        by_follower: Array = self.results["reward"].reshape(self.count, self.padded)
-        return by_follower.mean(axis=0)[: self.num_groups]
+        by_follower = self._flown(self.results["reward"]).T
+        total: Array = by_follower[0].copy()
+        for rewards in by_follower[1:]:  # in this order for any number of groups
+            total += rewards
+        return total / self.count
 
     def set_actions(self, actions: NDArray[np.floating]) -> None:
         """Take the actions (num_groups, count, 3) of the next step."""

@@ -1,0 +1,1 @@
+"""Baselines for several followers: architectures, avoidance, and who flies where."""
