@@ -9,17 +9,16 @@ from typing import ClassVar
 
 import numpy as np
 
+from baselines.swarm.least_change import least_change
+from baselines.swarm.planned_neighbours import by_plan
 from baselines.swarm.policy import SwarmPolicy
 from formation_env.dynamics.hcw import HCW, transition_matrix
 from formation_env.numerics.arrays import Array, Observations
 from formation_env.settings import NonNegative, Positive, settings
-from formation_env.task.observation import ObservationLayout
 
 SIDE = np.array([0.0, 0.0, 1.0])
 """Where a pair that would meet exactly gives way: cross-track, which its other motion does not feel."""
 TOUCHING_M = 1e-3
-LEAST_LEVERAGE = 0.05
-"""Least leverage of an impulse on an axis, over the greatest, with which it counts as planned."""
 
 
 @settings
@@ -38,14 +37,14 @@ class AvoidanceSettings:
         sweeps: cbf: sweeps of the dual ascent.
     """
 
-    margin_m: NonNegative = 15.0
-    sigmas: NonNegative = 2.0
-    unheard_m_s: NonNegative = 0.05
+    margin_m: NonNegative = 16.0
+    sigmas: NonNegative = 2.4
+    unheard_m_s: NonNegative = 0.03
     samples: int = 32
-    urgency_s: Positive = 300.0
+    urgency_s: Positive = 110.0
     reach: Positive = 1.5
     stiffness_per_s2: Positive = 2e-5
-    rate_per_s: Positive = 2e-3
+    rate_per_s: Positive = 8e-3
     sweeps: int = 30
 
 
@@ -200,57 +199,6 @@ class Predictive(Avoidance):
             self.limits_m_s2,
             self.settings.sweeps,
         )
-
-
-def by_plan(observation: Observations, layout: ObservationLayout) -> Array:
-    """Relative states of the neighbours (..., neighbours, 6), m and m/s: of those not heard now, by their plan.
-
-    A message from before a burn says little of where its sender goes. The plan, which all know, does: in a transfer,
-    whoever is not heard is taken to have left its last message's place by the impulse that leads to its slot.
-    """
-    relative = layout.neighbours(observation, "relative_estimate")
-    age_s = layout.neighbours(observation, "message_age")
-    time_left_s = np.broadcast_to(layout.time_to_arrival_s(observation)[..., None], age_s.shape)
-    rows = (age_s > layout.dt_s / 2) & (time_left_s > layout.dt_s / 2)
-    if not rows.any():
-        return relative
-    n, age_s, left_s = layout.mean_motion_rad_s, age_s[rows], time_left_s[rows]
-    own = np.broadcast_to(layout.estimate(observation)[..., None, :], relative.shape)[rows]
-    slots = layout.state(observation, "reference")[..., None, :] + layout.neighbours(observation, "relative_reference")
-    sent = np.matvec(transition_matrix(n, -age_s), relative[rows] + own)
-    goal = np.matvec(transition_matrix(n, left_s), slots[rows])
-    Phi = transition_matrix(n, left_s + age_s)
-    miss = (goal - np.matvec(Phi, sent))[:, :3]
-    sent[:, 3:] += np.matvec(np.linalg.pinv(Phi[:, :3, 3:], rcond=LEAST_LEVERAGE), miss)
-    relative[rows] = np.matvec(transition_matrix(n, age_s), sent) - own
-    return relative
-
-
-def least_change(wanted: Array, normals: Array, least: Array, limits: Array, sweeps: int) -> Array:
-    """The nearest accelerations to those wanted with normals . a >= least, within limits per axis.
-
-    Dykstra's alternating projections (Boyle & Dykstra 1986); where no acceleration satisfies all, the limits win.
-
-    Args:
-        wanted: (..., 3).
-        normals: unit vectors (..., constraints, 3).
-        least: (..., constraints); -inf for none.
-        limits: broadcast to (..., 3).
-        sweeps: over all constraints.
-    """
-    a, count = wanted.copy(), normals.shape[-2]
-    multipliers = np.zeros(least.shape)
-    correction = np.zeros(wanted.shape)
-    for _ in range(sweeps):
-        for index in range(count):
-            normal = normals[..., index, :]
-            freed = a - multipliers[..., index, None] * normal
-            multipliers[..., index] = np.maximum(least[..., index] - np.vecdot(normal, freed), 0.0)
-            a = freed + multipliers[..., index, None] * normal
-        freed = a + correction
-        a = np.clip(freed, -limits, limits)
-        correction = freed - a
-    return np.clip(a, -limits, limits)
 
 
 def _polar(vectors: Array) -> tuple[Array, Array]:

@@ -101,7 +101,10 @@ class OwnLaws:
 
 
 def _typical_slot(scenario: Scenario, follower: int) -> int:
-    """The slot that a law is designed for: a follower's own, or if all are drawn, one that it must fly to."""
+    """The slot that a law is designed for: a follower's own, or if all are drawn, the opposite one.
+
+    The law flies to any slot; of the swaps' slots this one's law cost least, all followers and slots considered.
+    """
     return follower if scenario.slots == "fixed" else (follower + scenario.followers // 2) % scenario.followers
 
 

@@ -12,8 +12,14 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from formation_env.envs import group_options, info_keys, interface
+from formation_env.envs.batch_arguments import (
+    MASK_OPTION,
+    check_arguments,
+    check_ready,
+    read_autoreset_mode,
+    read_mask,
+)
 from formation_env.envs.swarm import joint
-from formation_env.envs.vector import MASK_OPTION, check_arguments, check_ready, read_autoreset_mode, read_mask
 from formation_env.kernel.group_simulation import GroupSimulation
 from formation_env.kernel.metrics import episode_metrics
 from formation_env.kernel.threads import check_num_threads

@@ -1,6 +1,5 @@
 """The batched environment: many rows of a simulation."""
 
-import reprlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -13,6 +12,13 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from formation_env.envs import info_keys, interface
+from formation_env.envs.batch_arguments import (
+    MASK_OPTION,
+    check_arguments,
+    check_ready,
+    read_autoreset_mode,
+    read_mask,
+)
 from formation_env.kernel.metrics import METRICS, SAFETY_METRICS, episode_metrics
 from formation_env.kernel.reused_arrays import ReusedZeros
 from formation_env.kernel.simulation import Simulation
@@ -23,7 +29,6 @@ from formation_env.task.scenario import Scenario
 Observations = NDArray[np.float32]
 Flags = NDArray[np.bool_]
 
-MASK_OPTION: Final = "reset_mask"
 _NO_ROWS: Final = np.empty(0, np.intp)
 
 
@@ -84,7 +89,6 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self._totals_blocks = ReusedZeros([((len(self._metrics), num_envs), float)])
         self._info_keys = info_keys.keys_of(self.scenario, self.simulation.guarded, analysis)
         self._every_row = np.ones(num_envs, bool)
-        self._no_cost = np.broadcast_to(0.0, num_envs)
         self._keyed = False
         self._waiting = np.empty(0, np.intp)  # rows that ended and are not reset yet
 
@@ -200,7 +204,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         mask = self._every_row.copy() if rows is None else self._mask(rows)
         shown = info_keys.batched(self._info_keys, results, mask)
         if not self.simulation.guarded:
-            shown |= info_keys.with_mask({info_keys.COST: self._no_cost}, mask)
+            shown |= info_keys.with_mask({info_keys.COST: np.zeros(self.num_envs)}, mask)
         return shown
 
     def _mask(self, rows: NDArray[np.intp]) -> Flags:
@@ -208,57 +212,3 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         mask = np.zeros(self.num_envs, bool)
         mask[rows] = True
         return mask
-
-
-def read_mask(mask: Any, num_rows: int, keyed: bool) -> NDArray[np.intp]:
-    """Indices of the rows to reset: all, or those of a mask.
-
-    Raises:
-        ValueError: no flags, another number of them, or not all of them before the rows have streams (`keyed`).
-    """
-    if mask is None:
-        return np.arange(num_rows)
-    mask = np.asarray(mask)
-    if mask.shape != (num_rows,) or mask.dtype != np.bool_:
-        raise ValueError(f"{MASK_OPTION}: must be bool ({num_rows},), got {mask.dtype} {mask.shape}")
-    if not keyed and not mask.all():
-        raise ValueError(f"{MASK_OPTION}: the first reset must be of all rows")
-    return np.flatnonzero(mask)
-
-
-def check_ready(keyed: bool, ended: NDArray[np.intp]) -> None:
-    """Refuse a step that needs a reset before it: of all rows, or of those that have ended.
-
-    Raises:
-        gymnasium.error.ResetNeeded: it does.
-    """
-    if not keyed:
-        raise gymnasium.error.ResetNeeded("step: call reset first")
-    if len(ended):
-        rows = reprlib.repr(ended.tolist())
-        raise gymnasium.error.ResetNeeded(
-            f"step: rows {rows} have ended; reset them with options={{'{MASK_OPTION}': mask}}"
-        )
-
-
-def check_arguments(num_envs: int, render_mode: str | None, max_episode_steps: int | None) -> None:
-    """Refuse no rows, a render mode, or no steps."""
-    if num_envs < 1:
-        raise ValueError(f"num_envs: must be at least 1, got {num_envs}")
-    if render_mode is not None:
-        raise ValueError(f"render_mode: the batched environment has none, got {render_mode!r}")
-    if max_episode_steps is not None and max_episode_steps < 1:
-        raise ValueError(f"max_episode_steps: must be at least 1, got {max_episode_steps}")
-
-
-def read_autoreset_mode(mode: AutoresetMode | str) -> AutoresetMode:
-    """An autoreset mode, which may be given by its value.
-
-    Raises:
-        ValueError: there is no such mode.
-    """
-    try:
-        return AutoresetMode(mode)
-    except ValueError:
-        known = [each.value for each in AutoresetMode]
-        raise ValueError(f"autoreset_mode: must be one of {known}, got {mode!r}") from None

@@ -12,6 +12,7 @@ from numba import types
 from numpy.typing import NDArray
 
 from formation_env.kernel import packing
+from formation_env.kernel.group_scratch import Scratch, group_scratch
 from formation_env.kernel.program import (
     TYPES,
     Kinds,
@@ -29,6 +30,7 @@ from formation_env.kernel.stages import (
     link,
     memory,
     messages,
+    neighbour_lines,
     neighbours,
     noise,
     observe,
@@ -39,13 +41,11 @@ from formation_env.kernel.stages import (
 )
 from formation_env.kernel.stages.inter_satellite_link import AGE, LinkSettings, pair, place
 from formation_env.kernel.stages.memory import Flags, Integers
-from formation_env.kernel.tile import STATE, STATE_SIZE, WORK, WORK32_SIZE, WORK_SIZE
+from formation_env.kernel.tile import STATE, STATE_SIZE, WORK
 from formation_env.numerics.arrays import Array, Array32
 from formation_env.numerics.jit import LANES, compiled_program, entry_point, tile_function, whole_vectors
 from formation_env.task.members import members
-from formation_env.task.observation import NEIGHBOUR_SIZE
 from formation_env.task.scenario import Scenario
-from formation_env.task.schedule import WIDTH
 
 
 class Rules(NamedTuple):
@@ -133,69 +133,6 @@ def link_settings(rules: Array) -> LinkSettings:
     return LinkSettings(rules[4], rules[5], rules[6], rules[7], rules[8], rules[9])
 
 
-class Scratch(NamedTuple):
-    """Scratch space of a block of groups.
-
-    Attributes:
-        works: of each follower, double.
-        works32: likewise, single.
-        known: what followers know of one another (followers, `neighbours.KNOWN_SIZE`).
-        views: of the neighbours of each follower (followers, followers - 1, `neighbours.VIEW_SIZE`).
-        spare_view: one more.
-        lines: for the observations' parts of all neighbours.
-        ranks: of the neighbours (followers - 1, LANES).
-        lanes: groups in which a pair does not hear each other (pairs, LANES).
-        deaf: how many these are (pairs,).
-    """
-
-    works: Array
-    works32: Array32
-    known: Array32
-    views: Array32
-    spare_view: Array32
-    lines: Array32
-    ranks: Rows
-    lanes: Rows
-    deaf: Rows
-
-
-def scratch_sizes(columns: int, count: int) -> tuple[int, int, int]:
-    """How many numbers of scratch space a block needs: double, single and whole.
-
-    Args:
-        columns: of the schedule.
-        count: followers.
-    """
-    others = count - 1
-    views = (count * others + 1) * neighbours.VIEW_SIZE + LANES * others * NEIGHBOUR_SIZE
-    return (
-        count * (WORK_SIZE + (columns - WIDTH) * LANES),
-        count * (WORK32_SIZE + neighbours.KNOWN_SIZE) + views,
-        count * others // 2 * (LANES + 1) + others * LANES,
-    )
-
-
-@tile_function
-def group_scratch(numbers: Array, numbers32: Array32, integers: Rows, count: int) -> Scratch:
-    """Divide scratch space of `scratch_sizes`."""
-    others, pairs = count - 1, count * (count - 1) // 2
-    known = count * WORK32_SIZE
-    views = known + count * neighbours.KNOWN_SIZE
-    spare = views + count * others * neighbours.VIEW_SIZE
-    lines = spare + neighbours.VIEW_SIZE
-    return Scratch(
-        numbers.reshape(count, -1),
-        numbers32[:known].reshape(count, WORK32_SIZE),
-        numbers32[known:views].reshape(count, neighbours.KNOWN_SIZE),
-        numbers32[views:spare].reshape(count, others, neighbours.VIEW_SIZE),
-        numbers32[spare:lines],
-        numbers32[lines:],
-        integers[: others * LANES].reshape(others, LANES),
-        integers[others * LANES : (others + pairs) * LANES].reshape(pairs, LANES),
-        integers[(others + pairs) * LANES :],
-    )
-
-
 # Long: its arguments.
 @tile_function
 def show(
@@ -245,10 +182,10 @@ def show(
     flat = observations.reshape(-1)
     for f in range(count):
         observe.observe(tiles[f, block], scratch.works[f], scratch.works32[f], n)
-        neighbours.rank(views[f], scratch.ranks, n)
+        neighbour_lines.rank(views[f], scratch.ranks, n)
         for i in range(n):
             starts[i] = (groups[i] * count + f) * observations.shape[1]
-        neighbours.write(scratch.works32[f], views[f], scratch.ranks, scratch.lines, shown, flat, starts, n)
+        neighbour_lines.write(scratch.works32[f], views[f], scratch.ranks, scratch.lines, shown, flat, starts, n)
 
 
 # Long: numba takes the arrays one by one, and the order of the stages is best read at one place.
@@ -257,6 +194,7 @@ def _step(kinds: Kinds, sources: str) -> Any:
     thrust, move, predict, sense, measure, table = stages_of(kinds)
     side_by_side = kinds.filter_model == packing.CONSTANT  # else the model is that of the row's step
 
+    # Long: see above.
     @compiled_program("group_step", kinds, sources)
     def step(
         states: Array,
@@ -372,6 +310,7 @@ def _reset(kinds: Kinds, sources: str) -> Any:
     """Compile the reset of some groups."""
     _, _, _, sense, measure, _ = stages_of(kinds)
 
+    # Long: see above.
     @compiled_program("group_reset", kinds, sources)
     def reset(
         states: Array,

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from formation_env.kernel.group_program import Rules, group_kinds, group_program, scratch_sizes
+from formation_env.kernel.group_program import Rules, group_kinds, group_program
+from formation_env.kernel.group_scratch import scratch_sizes
 from formation_env.kernel.reused_arrays import ReusedArrays
 from formation_env.kernel.simulation import Simulation
 from formation_env.kernel.stages.inter_satellite_link import PAIR_SIZE, LinkSettings

@@ -29,6 +29,7 @@ from formation_env.kernel.stages import (
     kalman_filter,
     link,
     memory,
+    neighbour_lines,
     neighbours,
     noise,
     nonlinear_motion,
@@ -49,7 +50,7 @@ FLAGS, INTEGERS = types.boolean[:, ::1], types.int64[:, ::1]
 PLANS, VIEWS = types.float64[:, :, ::1], types.float32[:, :, ::1]
 
 LINK: Final = types.NamedUniTuple(types.float64, len(LinkSettings._fields), LinkSettings)
-LANE_LIST: Final = types.intp[::1]
+LANE_LIST, LANE_TABLE = types.intp[::1], types.intp[:, ::1]
 MOTION: Final = (FIELDS, FIELDS, TABLE, INT, INT)
 FILTER: Final = (FIELDS, FIELDS, TABLE, INT)
 SENSE: Final = (FIELDS, FIELDS, FIELDS32, TABLE, INT)
@@ -83,10 +84,11 @@ STAGES: Final = {
     inter_satellite_link.hear: ((FIELDS, INT, FIELDS, FIELDS, LINK, FIELDS, INT), 2),
     closest_approach.end_approach: ((FIELDS, INT), 2),
     closest_coast.closest_coast: ((*(FIELDS32,) * 3, INT), 1),
-    neighbours.scale: ((FIELDS, FIELDS, FIELDS32, FIELDS32, INT), 13),
-    neighbours._differences: ((*(FIELDS32,) * 3, INT), 2),
-    neighbours.look: ((FIELDS32, FIELDS32, FIELDS32, FIELDS, LANE_LIST, INT, FIELDS, FIELDS, FIELDS32, INT), 3),
-    neighbours.rank: ((TABLE32, types.int32[:, ::1], INT), 2),
+    neighbours.scale: ((FIELDS, FIELDS, FIELDS32, FIELDS32, INT), 3),
+    neighbours._differences: ((*(FIELDS32,) * 4, INT), 3),
+    neighbours.meet: ((FIELDS32, FIELDS32, FIELDS32, FIELDS, FIELDS32, FIELDS32, INT), 4),
+    neighbour_lines.rank: ((TABLE32, LANE_TABLE, INT), 2),
+    neighbour_lines.collect: ((TABLE32, LANE_TABLE, FIELDS32, LANE_LIST, INT), 1),
     group.end_together: ((TABLE, INT), 1),
     memory.write_safety: ((FIELDS, TABLE, INT, INT), 1),
     reward.score: ((FIELDS, FIELDS, TABLE, INT), 2),
