@@ -45,11 +45,14 @@ def report(arguments: ReportArguments) -> None:
     def write() -> Path:
         from baselines.experiments.policy_factories import classical
         from baselines.report import write_report
+        from baselines.report.swarm_table import swarm_tables
+        from baselines.report.table import no_tables
         from formation_env.task.loading import ENV_IDS
 
         envs = arguments.envs or list(ENV_IDS)
         policies, command = classical(arguments.policy or (), envs), command_line(NAME)
-        return write_report(policies, envs, arguments.options(), arguments.out, command, arguments.processes)
+        tables = no_tables if arguments.envs else swarm_tables(arguments.episodes)
+        return write_report(policies, envs, arguments.options(), arguments.out, command, arguments.processes, tables)
 
     write_report_page(arguments.out, arguments.resume, write)
 
@@ -88,6 +91,35 @@ def sweep(
         return write_sweep(classical(names, flown), flown, options, out, command_line(NAME), processes)
 
     write_report_page(out, resume, write)
+
+
+@app.command(epilog=f"Example: {DISTRIBUTION} baselines swarm swap --episodes 20 --outage-s 300 --outage-s 1200")
+def swarm(
+    envs: Envs = None,
+    episodes: Episodes = 100,
+    outage_s: Annotated[
+        list[float] | None,
+        typer.Option(
+            min=1.0, help="Mean outage of the links between followers, s; may be repeated.", show_default="as they are"
+        ),
+    ] = None,
+    out: Out = Path("reports"),
+) -> None:
+    """Compare architectures and avoidance of several followers: cost, violations, collisions, least distance."""
+    from baselines.report.swarm_table import outage_table, swarm_table
+    from formation_env.files import check_writable, write_texts
+    from formation_env.registration import SWARM_IDS
+    from formation_env.settings import ConfigError
+    from formation_env.task.loading import load_scenario
+
+    chosen = envs or list(SWARM_IDS)
+    for env in chosen:
+        if load_scenario(env).followers == 1:
+            raise ConfigError(f"{env}: has one follower; baselines report compares policies there")
+    check_writable(out)
+    table = outage_table(chosen, episodes, outage_s) if outage_s else swarm_table(chosen, episodes)
+    write_texts(out, {f"{table.name}.md": table.markdown()})
+    typer.echo(table.markdown())
 
 
 app.command(epilog=f"Example: {EXAMPLE}")(tune)

@@ -40,6 +40,7 @@ LAYERS = {
         {"design", "result_cache"},
         {"optimal"},
         {"controllers"},
+        {"swarm"},
         {"experiments"},
         {"report", "tuning"},
         {"thesis"},

@@ -14,6 +14,7 @@ from baselines.controllers.registry import POLICIES
 from baselines.experiments.policy_factories import PolicyFactory, classical
 from baselines.experiments.statistics import Results
 from baselines.report import ReportOptions, Table, write_report
+from baselines.report.swarm_table import swarm_tables
 from formation_env.evaluation.rollout import Policy
 from formation_env.settings import ConfigError
 from formation_env.task.loading import ENV_IDS, load_scenario, scenario_names
@@ -146,7 +147,8 @@ def report_models(
     cards = {label: _cards(paths) for label, paths in sources.items()}
 
     def tables(results: Sequence[Results]) -> list[Table]:
-        return [learned_table(results, cards)] if any(cards.values()) else []
+        learned = [learned_table(results, cards)] if any(cards.values()) else []
+        return learned if envs or models else [*learned, *swarm_tables(options.episodes)(results)]
 
     factories: dict[str, PolicyFactory] = {**classical(policies, flown), **learned, **own}
     return write_report(factories, flown, options, out, command, workers, tables)
