@@ -28,14 +28,16 @@ COLUMNS: Final = (
     "architecture",
     "avoidance",
     "cost, m/s per follower",
+    "delta-v, m/s",
     "more than without avoidance, m/s",
     "episodes with a violation, per 1000",
     "with a collision, per 1000",
     "least distance, m",
 )
 NOTE: Final = (
-    "Same seeds for all lines of an environment. A violation is a step with info['cost'] = 1 of any follower; a collision ends the group's episode, and costs as much as staying at the "
-    "distance limit to the end. Means with 95 % bootstrap intervals, the difference paired by seed; rates with exact 95 % intervals (Clopper-Pearson)."
+    "All lines of an environment fly the same seeds. A violation is a step with info['cost'] = 1 of any follower; a "
+    "collision ends the group's episode, and costs as much as staying at the distance limit to the end. Means with "
+    "95 % bootstrap intervals, the difference paired by seed; rates with exact 95 % intervals (Clopper-Pearson)."
 )
 
 
@@ -73,10 +75,8 @@ def flights(
     """Episodes of each policy, see `fly_groups`; `outage_s` as of `with_outages`."""
     scenario = load_scenario(env)
     flown = scenario if outage_s is None else with_outages(scenario, outage_s)
-    return {
-        each: fly_groups(make_swarm_policy(each[0], flown, each[1]), flown, seeds("test", episodes))
-        for each in policies
-    }
+    flown_seeds = seeds("test", episodes)
+    return {each: fly_groups(make_swarm_policy(each[0], flown, each[1]), flown, flown_seeds) for each in policies}
 
 
 def _rows(label: str, flown: Mapping[tuple[str, str], pd.DataFrame]) -> list[tuple[Cell, ...]]:
@@ -92,6 +92,7 @@ def _rows(label: str, flown: Mapping[tuple[str, str], pd.DataFrame]) -> list[tup
                 architecture,
                 avoidance,
                 _mean(episodes["cost_m_s"]),
+                _mean(episodes["delta_v_m_s"]),
                 more,
                 Quantity(per_thousand(episodes["violated"]), len(episodes)),
                 Quantity(per_thousand(episodes["collided"]), len(episodes)),

@@ -187,6 +187,7 @@ def _step(kinds: Kinds, sources: str) -> Any:
     thrust, move, predict, sense, measure, table = stages_of(kinds)
     varied, guarded = kinds.varied, kinds.guarded
 
+    # Long: see above.
     @compiled_program("step", kinds, sources)
     def step(
         states: Array,

@@ -143,7 +143,7 @@ class Simulation:
         del self.results  # so that its blocks are written again if nobody else holds them
         self.results = StepResults(self._blocks.take(), self.num_rows)
         parts = [self.arguments(observations, first, last) for first, last in self._parts]
-        ended = self.fly(parts[0]) if len(parts) == 1 else run_parts(lambda part: self.fly(parts[part]), len(parts))
+        ended = run_parts(lambda part: self.fly(parts[part]), len(parts))
         self.count_safety()
         return ended
 
@@ -230,8 +230,7 @@ class Simulation:
     @property
     def first_references_m(self) -> Array:
         """The variants' reference positions at the start (variants, 3), m."""
-        first = OFFSETS["scored_position"]
-        return self.schedule[:, 0, first : first + 3]
+        return self.schedule[:, 0, OFFSETS["scored_position"] :][:, :3]
 
     def variant(self, rows: Rows = ALL_ROWS) -> NDArray[np.intp]:
         """Index of the variant that each row flew in its last step, or begins (rows,)."""
@@ -248,6 +247,5 @@ class Simulation:
         if isinstance(rows, slice):
             block = self._states[:, offset : offset + size * LANES].reshape(-1, size, LANES)
             return block.transpose(0, 2, 1).copy().reshape(-1, size)[: self.num_rows][rows]
-        columns = offset + np.arange(size) * LANES
-        values: Array = self._states[(rows // LANES)[:, None], columns + (rows % LANES)[:, None]]
-        return values
+        columns = offset + np.arange(size) * LANES + (rows % LANES)[:, None]
+        return np.asarray(self._states[(rows // LANES)[:, None], columns])
