@@ -103,10 +103,11 @@ def swarm(
             min=1.0, help="Mean outage of the links between followers, s; may be repeated.", show_default="as they are"
         ),
     ] = None,
+    scp: Annotated[bool, typer.Option("--scp", help="Also the centralised plan, seconds for each episode.")] = False,
     out: Out = Path("reports"),
 ) -> None:
     """Compare architectures and avoidance of several followers: cost, violations, collisions, least distance."""
-    from baselines.report.swarm_table import outage_table, swarm_table
+    from baselines.report.swarm_table import LAYERS, POLICIES, SCP, outage_table, swarm_table
     from formation_env.files import check_writable, write_texts
     from formation_env.registration import SWARM_IDS
     from formation_env.settings import ConfigError
@@ -117,7 +118,11 @@ def swarm(
         if load_scenario(env).followers == 1:
             raise ConfigError(f"{env}: has one follower; baselines report compares policies there")
     check_writable(out)
-    table = outage_table(chosen, episodes, outage_s) if outage_s else swarm_table(chosen, episodes)
+    plan = (SCP,) if scp else ()
+    if outage_s:
+        table = outage_table(chosen, episodes, outage_s, (*LAYERS, *plan))
+    else:
+        table = swarm_table(chosen, episodes, (*POLICIES, *plan))
     write_texts(out, {f"{table.name}.md": table.markdown()})
     typer.echo(table.markdown())
 

@@ -1,7 +1,8 @@
 """A control problem with the environment's cost as a second-order cone program: for whole episodes and for horizons.
 
     minimise  sum dt_j |(u_j, sigma_j)| + sum w_j (linear s_j + quadratic s_j^2),   s_j = |(x_j - r_j, rho_j)|
-    so that   x_(j+1) = F_j x_j + G_j u_j + d_j,   |u_j| <= limit_j along each axis,   x_m = goal_m at the instants met
+    so that   x_(j+1) = F_j x_j + G_j u_j + d_j,   |u_j| <= limit_j along each axis,   x_m = goal_m at the instants met,
+              n_k . position_k >= least_k at the instants kept off
 
 over blocks j of one or more steps, each of constant thrust. A block couples neighbours only, so the program is sparse
 and its solution takes a time in proportion to the blocks. sigma and rho are the expected scatter of thrust and position
@@ -40,6 +41,9 @@ class ControlProblem:
         thrust_scatter_m_s2: rms scatter of the acceleration in the blocks (N,), m/s^2; given along with the other.
         met: blocks at whose ends the state must be the goal.
         goal: states (met, 6), m and m/s.
+        kept: blocks at whose ends the position must be in a half-space (kept,); a block may stand there several times.
+        normals: unit vectors (kept, 3).
+        least_m: normal . position is at least this (kept,), m.
     """
 
     F: Array
@@ -54,6 +58,9 @@ class ControlProblem:
     thrust_scatter_m_s2: Array | None = None
     met: tuple[int, ...] = ()
     goal: Array | None = None
+    kept: tuple[int, ...] = ()
+    normals: Array | None = None
+    least_m: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -125,10 +132,17 @@ class ConeProgram:
         self._scale = np.repeat([units.length_m, units.speed_m_s], 3)
         self._count = len(problem.F)
         self._weighted = np.flatnonzero(problem.error_weight > 0)
-        parts = [self._motion(), self._meeting(), self._box(), self._thrust_cones(), self._error_cones()]
+        parts = [
+            self._motion(),
+            self._meeting(),
+            self._box(),
+            self._half_spaces(),
+            self._thrust_cones(),
+            self._error_cones(),
+        ]
         A = sparse.vstack([matrix for matrix, _ in parts]).tocsc()
         self._b = np.concatenate([b for _, b in parts])
-        zero, positive = len(parts[0][1]) + len(parts[1][1]), len(parts[2][1])
+        zero, positive = len(parts[0][1]) + len(parts[1][1]), len(parts[2][1]) + len(parts[3][1])
         P, q = self._objective()
         cones = Cones(zero, positive, self._count + len(self._weighted), self._cone_size)
         self._solver = ConeSolver(P, q, A, cones, tolerance=tolerance)
@@ -207,6 +221,15 @@ class ConeProgram:
         both = sparse.vstack([sparse.eye_array(3 * n), -sparse.eye_array(3 * n)])
         rest = sparse.csc_array((6 * n, n + len(self._weighted)))
         return sparse.hstack([sparse.csc_array((6 * n, 6 * n)), both, rest]), np.ones(6 * n)
+
+    def _half_spaces(self) -> tuple[Any, Array]:
+        """n . x >= least at the ends of the blocks kept off."""
+        h, count, length = self._problem, len(self._problem.kept), self._units.length_m
+        if h.normals is None or h.least_m is None:
+            return sparse.csc_array((0, self._width())), np.zeros(0)
+        rows, columns = np.repeat(np.arange(count), 3), (6 * np.array(h.kept)[:, None] + [0, 1, 2]).ravel()
+        matrix = sparse.csc_array((-h.normals.ravel(), (rows, columns)), shape=(count, self._width()))
+        return matrix, -h.least_m / length
 
     def _thrust_cones(self) -> tuple[Any, Array]:
         """(t_j, u_j, sigma_j) in the cone."""

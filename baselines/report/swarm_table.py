@@ -11,6 +11,7 @@ from baselines.report.table import Cell, Quantity, Table, Tables
 from baselines.swarm.architectures import ARCHITECTURES
 from baselines.swarm.avoidance import AVOIDANCE
 from baselines.swarm.registry import NO_AVOIDANCE, make_swarm_policy
+from baselines.swarm.scp import Scp
 from formation_env.evaluation.seeds import seeds
 from formation_env.evaluation.statistics import bootstrap_interval
 from formation_env.registration import SWARM_IDS
@@ -22,6 +23,8 @@ POLICIES: Final = (
     *((PLAIN, name) for name in AVOIDANCE),
 )
 """Architecture and avoidance of each line."""
+SCP: Final = (Scp.name, NO_AVOIDANCE)
+"""The centralised plan: seconds for each episode, so that only those who ask for it fly it."""
 LAYERS: Final = tuple((PLAIN, name) for name in (NO_AVOIDANCE, *AVOIDANCE))
 COLUMNS: Final = (
     "environment",
@@ -30,6 +33,7 @@ COLUMNS: Final = (
     "cost, m/s per follower",
     "delta-v, m/s",
     "more than without avoidance, m/s",
+    "more than scp, m/s",
     "episodes with a violation, per 1000",
     "with a collision, per 1000",
     "least distance, m",
@@ -37,7 +41,7 @@ COLUMNS: Final = (
 NOTE: Final = (
     "All lines of an environment fly the same seeds. A violation is a step with info['cost'] = 1 of any follower; a "
     "collision ends the group's episode, and costs as much as staying at the distance limit to the end. Means with "
-    "95 % bootstrap intervals, the difference paired by seed; rates with exact 95 % intervals (Clopper-Pearson)."
+    "95 % bootstrap intervals, differences of delta-v paired by seed; rates with exact 95 % intervals (Clopper-Pearson)."
 )
 
 
@@ -58,13 +62,15 @@ def swarm_tables(episodes: int) -> Tables:
     return lambda results: [swarm_table(tuple(SWARM_IDS), episodes)]
 
 
-def outage_table(envs: Sequence[str], episodes: int, outages_s: Sequence[float]) -> Table:
+def outage_table(
+    envs: Sequence[str], episodes: int, outages_s: Sequence[float], policies: Sequence[tuple[str, str]] = LAYERS
+) -> Table:
     """The same for the layers of avoidance, with links between followers whose outages grow."""
     rows = [
         row
         for env in envs
         for outage_s in outages_s
-        for row in _rows(f"{env}, outages of {outage_s:g} s", flights(env, episodes, LAYERS, outage_s))
+        for row in _rows(f"{env}, outages of {outage_s:g} s", flights(env, episodes, policies, outage_s))
     ]
     return Table("swarm_outages", "Avoidance under outages of the links between followers", COLUMNS, tuple(rows), NOTE)
 
@@ -80,12 +86,11 @@ def flights(
 
 
 def _rows(label: str, flown: Mapping[tuple[str, str], pd.DataFrame]) -> list[tuple[Cell, ...]]:
-    plain = flown.get((PLAIN, NO_AVOIDANCE))
+    plain, best = flown.get((PLAIN, NO_AVOIDANCE)), flown.get(SCP)
     rows: list[tuple[Cell, ...]] = []
     for (architecture, avoidance), episodes in flown.items():
-        more: Cell = None
-        if plain is not None and avoidance != NO_AVOIDANCE:
-            more = _mean(episodes["delta_v_m_s"] - plain["delta_v_m_s"])
+        over_plain = None if avoidance == NO_AVOIDANCE else plain
+        over_best = None if (architecture, avoidance) == SCP else best
         rows.append(
             (
                 label,
@@ -93,13 +98,19 @@ def _rows(label: str, flown: Mapping[tuple[str, str], pd.DataFrame]) -> list[tup
                 avoidance,
                 _mean(episodes["cost_m_s"]),
                 _mean(episodes["delta_v_m_s"]),
-                more,
+                _more(episodes, over_plain),
+                _more(episodes, over_best),
                 Quantity(per_thousand(episodes["violated"]), len(episodes)),
                 Quantity(per_thousand(episodes["collided"]), len(episodes)),
                 round(float(episodes["least_distance_m"].min()), 1),
             )
         )
     return rows
+
+
+def _more(episodes: pd.DataFrame, reference: pd.DataFrame | None) -> Cell:
+    """Delta-v beyond that of another policy on the same seeds."""
+    return None if reference is None else _mean(episodes["delta_v_m_s"] - reference["delta_v_m_s"])
 
 
 def _mean(values: pd.Series) -> Quantity:

@@ -37,14 +37,14 @@ class AvoidanceSettings:
         sweeps: cbf: sweeps of the dual ascent.
     """
 
-    margin_m: NonNegative = 16.0
-    sigmas: NonNegative = 2.4
-    unheard_m_s: NonNegative = 0.03
+    margin_m: NonNegative = 22.0
+    sigmas: NonNegative = 2.5
+    unheard_m_s: NonNegative = 0.046
     samples: int = 32
-    urgency_s: Positive = 110.0
+    urgency_s: Positive = 150.0
     reach: Positive = 1.5
     stiffness_per_s2: Positive = 2e-5
-    rate_per_s: Positive = 8e-3
+    rate_per_s: Positive = 8.7e-3
     sweeps: int = 30
 
 

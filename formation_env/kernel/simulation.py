@@ -127,8 +127,7 @@ class Simulation:
             costs += self._flown(self.results["cost"])
             np.minimum(least, self._flown(self.results["least_distance"]), out=least)
 
-    def _flown(self, values: NDArray[Any]) -> NDArray[Any]:
-        """A view of the values (rows, ...) of all rows that fly."""
+    def _flown(self, values: NDArray[Any]) -> NDArray[Any]:  # a view of the values of all rows that fly
         return values
 
     def step(self, observations: Array32) -> int:

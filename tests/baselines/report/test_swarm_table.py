@@ -42,8 +42,9 @@ def test_tables_have_a_line_for_each_policy() -> None:
     policies = (("leader_follower", "none"), ("mimo", "none"), ("leader_follower", "cbf"))
     table = swarm_table(["swap"], 2, policies)
     assert [row[1:3] for row in table.rows] == list(policies)
-    more = COLUMNS.index("more than without avoidance, m/s")
+    more, over_scp = COLUMNS.index("more than without avoidance, m/s"), COLUMNS.index("more than scp, m/s")
     assert [row[more] is None for row in table.rows] == [True, True, False]
+    assert [row[over_scp] for row in table.rows] == [None, None, None]
     grown = outage_table(["swap"], 1, [60.0, 1200.0])
     assert len(grown.rows) == 8
     assert "outages of 1200 s" in grown.markdown()

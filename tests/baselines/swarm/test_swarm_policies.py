@@ -240,5 +240,7 @@ def test_unknown_names_are_refused() -> None:
         make_swarm_policy("mimo", SWAP, "cfb")
     with pytest.raises(ConfigError, match="predictive: margin_m: must be greater than or equal to 0"):
         make_swarm_policy("mimo", SWAP, "predictive", avoidance_settings={"margin_m": -1.0})
+    with pytest.raises(ConfigError, match="avoidance: scp keeps apart by its plan"):
+        make_swarm_policy("scp", SWAP, "cbf")
     with pytest.raises(ValueError, match=r"observation: must be \(8, 157\)"):
         make_swarm_policy("mimo", SWAP).predict(np.zeros((7, 157)))
