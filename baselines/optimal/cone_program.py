@@ -114,6 +114,7 @@ class Plan:
     z: Array
 
 
+# Long: the rows of the program are best read at one place.
 class ConeProgram:
     """A problem's program, laid out once and solved for any number of starts, which change the right-hand side only."""
 

@@ -41,7 +41,7 @@ COLUMNS: Final = (
 NOTE: Final = (
     "All lines of an environment fly the same seeds. A violation is a step with info['cost'] = 1 of any follower; a "
     "collision ends the group's episode, and costs as much as staying at the distance limit to the end. Means with "
-    "95 % bootstrap intervals, differences of delta-v paired by seed; rates with exact 95 % intervals (Clopper-Pearson)."
+    "95 % bootstrap intervals, differences of delta-v paired by seed; rates with exact ones (Clopper-Pearson)."
 )
 
 

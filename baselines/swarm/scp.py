@@ -217,4 +217,4 @@ class Scp(SwarmPolicy):
         """Who flies where (followers,), by the reference states (followers, 6) at t = 0."""
         first = columns(self._goals, "reference")
         distances = np.linalg.norm(references[:, None, :3] - first[:, :3], axis=-1)
-        return distances.argmin(axis=-1)
+        return np.asarray(distances.argmin(axis=-1))

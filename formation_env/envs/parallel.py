@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
-from pettingzoo import ParallelEnv
+from pettingzoo import ParallelEnv  # type: ignore[import-untyped]
 
 from formation_env.envs import group_options, interface
 from formation_env.envs.swarm import FormationSwarmEnv, joint
@@ -17,7 +17,7 @@ from formation_env.task.scenario import Scenario
 Vectors = dict[str, NDArray[np.float32]]
 
 
-class FormationParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):
+class FormationParallelEnv(ParallelEnv[str, NDArray[np.float32], NDArray[np.float32]]):  # type: ignore[misc]
     """A group of followers, each an agent `follower_0`, `follower_1`, ...
 
     Observation (size,), action (3,) and reward of an agent are those of its line in a `FormationSwarmEnv`; infos have

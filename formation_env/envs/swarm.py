@@ -123,7 +123,8 @@ class FormationSwarmEnv(gymnasium.Env[Observations, NDArray[np.float32]]):
 
     def of_followers(self, name: str) -> NDArray[Any]:
         """Copy (followers, ...) of a result of the last step or reset, by its name in `kernel.results`."""
-        return self.simulation.by_group(self.simulation.results[name])[0].copy()
+        values: NDArray[Any] = self.simulation.by_group(self.simulation.results[name])[0]
+        return values.copy()
 
     def _info(self) -> dict[str, Any]:
         simulation = self.simulation

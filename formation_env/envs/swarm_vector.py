@@ -146,8 +146,8 @@ class FormationSwarmVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArr
         if len(self._waiting):  # they begin in this step; what they flew is overwritten
             self._begin(self._waiting, observations)
         rewards = simulation.rewards()
-        terminations = self._of_followers("terminated").all(axis=1)
-        truncations = self._of_followers("truncated").any(axis=1)
+        terminations: Flags = np.all(self._of_followers("terminated"), axis=1)
+        truncations: Flags = np.any(self._of_followers("truncated"), axis=1)
         ended = np.flatnonzero(terminations | truncations) if num_ended else _NO_GROUPS
         infos = self._infos(np.ones(self.num_envs, bool))
         if len(ended):

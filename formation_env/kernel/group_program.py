@@ -52,14 +52,14 @@ class Rules(NamedTuple):
     """Settings of a group, in the order of the line that holds them.
 
     Attributes:
-        count: followers.
+        followers: how many there are.
         shown: neighbours that an observation shows.
         together: 1 if all end with the first.
         random: 1 if each episode draws who flies where.
         link: of the links between followers.
     """
 
-    count: float
+    followers: float
     shown: float
     together: float
     random: float

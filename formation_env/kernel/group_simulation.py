@@ -147,14 +147,15 @@ def scratch(columns: int, count: int) -> tuple[Array, Array32, NDArray[np.intp]]
 
 def rules(scenario: Scenario) -> tuple[Array, Array]:
     """`Rules` as a line, and when a window of the links between followers is closed (steps + 1,)."""
-    between, times_s = scenario.inter_satellite_link, np.arange(scenario.num_steps + 1) * scenario.dt_s
+    between = scenario.inter_satellite_link
+    times_s: Array = scenario.dt_s * np.arange(scenario.num_steps + 1, dtype=float)
     chain = between.dropout.chain(scenario.dt_s, scenario.orbit)
     closed = between.dropout.closed(times_s).astype(float)
     link = LinkSettings(
         scenario.dt_s, between.range_m, chain.stationary_loss, chain.fail, chain.recover, windows=closed.max()
     )
     line = Rules(
-        count=scenario.followers,
+        followers=scenario.followers,
         shown=scenario.num_neighbours,
         together=float(scenario.safety.ends == "group"),
         random=float(scenario.slots == "random"),

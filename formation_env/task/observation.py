@@ -183,9 +183,9 @@ class ObservationLayout:
             return block * self.state_scale
         value = block[..., 0]
         if name == "message_age":
-            return np.expm1(value * np.log1p(self.period_s / self.dt_s)) * self.dt_s
+            return np.asarray(np.expm1(value * np.log1p(self.period_s / self.dt_s)) * self.dt_s)
         if name == "relative_sigma_pos":
-            return SIGMA_UNIT_POS_M * 10 ** (SIGMA_DECADES * value)
+            return np.asarray(SIGMA_UNIT_POS_M * 10 ** (SIGMA_DECADES * value))
         return value * {"closest_distance": self.length_m, "closest_time": self.period_s, "present": 1.0}[name]
 
 

@@ -90,7 +90,7 @@ def every_command() -> list[tuple[str, Any]]:
 def test_every_command_is_explained() -> None:
     """Each has a help, an example that calls it, and a help of each of its options."""
     found = every_command()
-    assert len(found) == 10 + 5 + 8
+    assert len(found) == 10 + 6 + 8
     for name, command in found:
         assert command.help, name
         assert command.epilog.startswith(f"Example: formation-env {name}"), name

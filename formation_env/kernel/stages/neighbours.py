@@ -29,7 +29,7 @@ Lanes = NDArray[np.intp]
 
 
 def _offset(name: str) -> int:
-    return NEIGHBOUR_SLICES[name].start * LANES
+    return int(NEIGHBOUR_SLICES[name].start) * LANES
 
 
 ESTIMATE: Final = _offset("relative_estimate")
